@@ -1,0 +1,79 @@
+"""Every steady flow of grains that an inclined chute can carry."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from chuteflow.analysis.curve import curve
+    from chuteflow.analysis.enumeration import flows
+    from chuteflow.analysis.hot import HotModel, hot
+    from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
+    from chuteflow.errors import ChuteflowError, InputError, SolveError
+    from chuteflow.faces.files import load, save
+    from chuteflow.steady.chute import Chute
+    from chuteflow.steady.flow import Flow, Profile
+    from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
+
+__version__ = "0.1.0"
+
+# Imported when first asked for, so that the command line starts quickly.
+_HOMES = {
+    "Branch": "analysis.results",
+    "Chute": "steady.chute",
+    "ChuteflowError": "errors",
+    "Curve": "analysis.results",
+    "Flow": "steady.flow",
+    "FlowSet": "analysis.results",
+    "InputError": "errors",
+    "Profile": "steady.flow",
+    "QUANTITIES": "steady.quantities",
+    "Quantity": "steady.quantities",
+    "Scales": "steady.quantities",
+    "Searched": "analysis.results",
+    "SolveError": "errors",
+    "SpecialPoint": "analysis.results",
+    "HotModel": "analysis.hot",
+    "curve": "analysis.curve",
+    "flows": "analysis.enumeration",
+    "hot": "analysis.hot",
+    "load": "faces.files",
+    "save": "faces.files",
+}
+
+__all__ = [
+    "QUANTITIES",
+    "Branch",
+    "Chute",
+    "ChuteflowError",
+    "Curve",
+    "Flow",
+    "FlowSet",
+    "HotModel",
+    "InputError",
+    "Profile",
+    "Quantity",
+    "Scales",
+    "Searched",
+    "SolveError",
+    "SpecialPoint",
+    "__version__",
+    "curve",
+    "flows",
+    "hot",
+    "load",
+    "save",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'chuteflow' has no attribute {name!r}")
+    value = getattr(import_module(f"chuteflow.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

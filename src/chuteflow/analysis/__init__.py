@@ -1,0 +1,1 @@
+"""What people ask: all flows at a flux, curves and their special points."""

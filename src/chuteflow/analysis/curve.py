@@ -1,0 +1,119 @@
+"""Every family of flows of a chute as an ordered branch, with its special points located.
+
+Families are entered from the landscape of trajectories, so that none is missed, and followed through folds
+in Q, M and T_surface by the general continuation of :mod:`chuteflow.numerics.continuation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from chuteflow.analysis.crossings import Chord, turning_point
+from chuteflow.analysis.existence import imbalance
+from chuteflow.analysis.families import traced_families
+from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
+from chuteflow.analysis.tracing import TracedFamily
+from chuteflow.errors import InputError
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.model import model
+from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+
+#: Quantities whose folds are located.
+_FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
+
+
+def curve(
+    chute: Chute,
+    *,
+    points: int = 200,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> Curve:
+    """Every family of steady flows on ``chute`` in a range.
+
+    Args:
+        chute: the chute.
+        points: flows on the longest branch, evenly in arclength in the plane (ln T_surface, ln M); shorter
+            branches take fewer in proportion.
+        tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
+        surface_temperature: range of T_surface.
+        largest_holdup: largest M.
+
+    Raises:
+        InputError: for a range or number out of bounds.
+        SolveError: where a family could not be followed or a flow not solved to the tolerance.
+    """
+    if not 2 <= points <= 100_000:
+        raise InputError(f"points = {points}: must be from 2 to 100000")
+    checked_tolerance(tolerance)
+    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    problem = model(chute)
+    found = traced_families(problem, within)
+    longest = max((float(family.arclength[-1]) for family in found), default=1.0)
+    branches = [
+        _branch(chute, family, max(8, round(points * float(family.arclength[-1]) / longest)), tolerance)
+        for family in found
+    ]
+    branches.sort(key=lambda branch: -float(branch.surface_temperature.max()))
+    return Curve(
+        chute=chute,
+        branches=tuple(branches),
+        searched=Searched((within.coldest, within.hottest), within.deepest),
+        tolerance=tolerance,
+        reason=None if branches else imbalance(problem),
+    )
+
+
+def _branch(chute: Chute, family: TracedFamily, points: int, tolerance: float) -> Branch:
+    solutions = family.sampled(points, tolerance)
+    ends = family.ends
+    if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
+        solutions.reverse()
+        ends = (ends[1], ends[0])
+    flows = [Flow(chute, s) for s in solutions]
+    special = [*_folds(chute, solutions, tolerance), *_changes(flows, tolerance)]
+    return Branch(tuple(flows), tuple(sorted(special, key=lambda point: point.position)), ends)
+
+
+def _folds(chute: Chute, solutions: Sequence[Solution], tolerance: float) -> list[SpecialPoint]:
+    """Flows at which Q, M or T_surface turns."""
+    macroscopic = np.array([s.macroscopic for s in solutions])
+    found = []
+    for kind, which in _FOLDS.items():
+        steps = np.diff(macroscopic[:, which])
+        for i in np.flatnonzero((steps[:-1] > 0.0) != (steps[1:] > 0.0)).tolist():
+            for first in (i, i + 1):
+                turn = turning_point(solutions[first], solutions[first + 1], which, tolerance)
+                if turn is not None:
+                    found.append(SpecialPoint(kind, Flow(chute, turn), first))
+                    break
+    return found
+
+
+def _changes(flows: Sequence[Flow], tolerance: float) -> list[SpecialPoint]:
+    """Flows at which the density turns inverted, or the interior another kind."""
+    found = []
+    for i in range(len(flows) - 1):
+        for kind, quantity in (
+            ("density-inversion", lambda flow: flow.density_excess),
+            ("interior-change", lambda flow: flow.net_loss_range[0]),
+            ("interior-change", lambda flow: flow.net_loss_range[1]),
+        ):
+            ends = quantity(flows[i]), quantity(flows[i + 1])
+            if (ends[0] > 0.0) != (ends[1] > 0.0):
+                found.append(SpecialPoint(kind, _zero(flows[i], flows[i + 1], quantity, ends, tolerance), i))
+    return found
+
+
+def _zero(
+    first: Flow, last: Flow, quantity: Callable[[Flow], float], ends: tuple[float, float], tolerance: float
+) -> Flow:
+    chute = first.chute
+    chord = Chord(first.solution, last.solution, tolerance)
+    return Flow(chute, chord.zero(lambda s: quantity(Flow(chute, s)), ends))

@@ -1,0 +1,148 @@
+"""Every steady flow of a chute at a given flux, hold-up, centre of mass or surface temperature.
+
+The families of flows come from the landscape of trajectories (:mod:`chuteflow.analysis.families`), which
+misses none. Along each, the flows that meet the condition are where the quantity crosses its value
+(:mod:`chuteflow.analysis.crossings`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chuteflow.analysis.crossings import crossings
+from chuteflow.analysis.existence import reason_for_none
+from chuteflow.analysis.families import Family, families
+from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.analysis.results import FlowSet, Searched
+from chuteflow.errors import InputError, SolveError
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.model import Model, model
+from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+
+_EXTENSIONS = 4
+#: A family leads out of the range towards a value if the quantity rises at least with this power there.
+_LEADS = 0.25
+#: The range is not extended to larger hold-ups where there are more traced families: their number would grow.
+_MOST_DEEPER = 3
+#: Flows whose ln M and ln T_surface differ by less are one flow.
+_SAME = 1e-7
+_QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
+
+
+def flows(
+    chute: Chute,
+    *,
+    Q: float | None = None,
+    M: float | None = None,
+    h: float | None = None,
+    T_surface: float | None = None,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> FlowSet:
+    """Every steady flow on ``chute`` with one given quantity, from hot to cold.
+
+    Args:
+        chute: the chute.
+        Q: mass flux (3.26). Give exactly one of Q, M, h and T_surface; all are dimensionless.
+        M: mass hold-up (3.27).
+        h: centre of mass (3.27).
+        T_surface: granular temperature far above (half-line) or at the interface.
+        tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
+        surface_temperature: range searched. It is extended where a family of flows leads out of it towards
+            the value asked for; the range that was searched in the end is part of the result.
+        largest_holdup: range searched, extended in the same way.
+
+    Raises:
+        InputError: for none or several of Q, M, h and T_surface, or a value out of range.
+        SolveError: where a flow that was seen could not be solved to the tolerance.
+    """
+    which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
+    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    checked_tolerance(tolerance)
+    if which in (LOG_T, LOG_M):
+        # Well inside, so that a turn near the value is seen from both sides.
+        within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
+    problem = model(chute)
+    search = _search(problem, which, value, tolerance, within)
+    for _ in range(_EXTENSIONS):
+        wider = _wider(search, which, value)
+        if wider == search.within:
+            break
+        try:
+            search = _search(problem, which, value, tolerance, wider)
+        except SolveError:
+            break  # what the narrower range holds is complete in itself
+    return FlowSet(
+        chute=chute,
+        flows=tuple(Flow(chute, s) for s in search.solutions),
+        searched=Searched((search.within.coldest, search.within.hottest), search.within.deepest),
+        tolerance=tolerance,
+        reason=None
+        if search.solutions
+        else reason_for_none(problem, [f.macroscopic for f in search.families], which, value, search.within),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The families in a range, and the flows among them that meet a condition."""
+
+    within: Range
+    families: list[Family]
+    solutions: list[Solution]
+
+
+def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
+    found = families(problem, within)
+    solutions = [s for family in found for s in crossings(family.knots, which, value, tolerance)]
+    return _Search(within, found, _distinct([s for s in solutions if within.contains(s.macroscopic)]))
+
+
+def _asked(given: dict[str, float | None]) -> tuple[int, float]:
+    named = {name: value for name, value in given.items() if value is not None}
+    if len(named) != 1:
+        what = ", ".join(named) if named else "none"
+        raise InputError(f"give exactly one of Q, M, h and T_surface: got {what}")
+    ((name, raw),) = named.items()
+    try:
+        value = float(raw)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {raw!r}: must be a number") from None
+    low, high = {"T_surface": WIDEST, "M": (1e-12, DEEPEST)}.get(name, (1e-12, 1e12))
+    if not low <= value <= high:
+        raise InputError(f"{name} = {value:g}: must be from {low:g} to {high:g}")
+    return _QUANTITIES[name], value
+
+
+def _wider(search: _Search, which: int, value: float) -> Range:
+    """The range with which families that lead out of it towards ``value`` reach it."""
+    target = float(np.log(value))
+    within = wider = search.within
+    deeper = sum(family.traced for family in search.families) <= _MOST_DEEPER
+    axes = (LOG_T, LOG_M) if deeper else (LOG_T,)
+    for family in search.families:
+        m = family.macroscopic
+        for end, before in ((m[0], m[1]), (m[-1], m[-2])) if len(m) > 1 else ():
+            left = target - float(end[which])
+            for axis in axes:
+                edge = within.edge(end, axis)
+                run = float(end[axis] - before[axis])
+                slope = float(end[which] - before[which]) / run if run else 0.0
+                if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
+                    reach = np.clip(float(end[axis]) + 1.2 * left / slope + edge, -600.0, 600.0)
+                    wider = wider.reaching(axis, float(np.exp(reach)))
+    return wider
+
+
+def _distinct(solutions: list[Solution]) -> list[Solution]:
+    """Without repetitions, hot to cold, then by hold-up."""
+    kept: list[Solution] = []
+    for s in solutions:
+        if all(np.abs(s.macroscopic - k.macroscopic)[LOG_M:].max() > _SAME for k in kept):
+            kept.append(s)
+    return sorted(kept, key=lambda s: (-s.macroscopic[LOG_T], s.macroscopic[LOG_M]))

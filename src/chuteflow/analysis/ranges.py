@@ -1,0 +1,92 @@
+"""The range of surface temperatures and hold-ups that is searched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_M, LOG_T
+
+#: Range searched unless another is asked for.
+SURFACE_TEMPERATURE = (1e-3, 1e5)
+LARGEST_HOLDUP = 30.0
+#: What can be searched at all.
+WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
+#: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
+_NEAR, _ROUNDING = 0.3, 1e-9
+
+
+@dataclass(frozen=True)
+class Range:
+    """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
+
+    A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
+    proportion to their temperature, and no family ends so.
+    """
+
+    coldest: float
+    hottest: float
+    deepest: float
+    shallowest: float
+
+    @classmethod
+    def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
+        """The range given.
+
+        Raises:
+            InputError: if it is empty or beyond what can be searched.
+        """
+        low, high = surface_temperature
+        if not WIDEST[0] <= low < high <= WIDEST[1]:
+            raise InputError(
+                f"surface temperatures from {low:g} to {high:g}: must rise, within {WIDEST[0]:g} to {WIDEST[1]:g}"
+            )
+        if not SHALLOWEST <= largest_holdup <= DEEPEST:
+            raise InputError(f"largest hold-up {largest_holdup:g}: must be from {SHALLOWEST:g} to {DEEPEST:g}")
+        return cls(low, high, largest_holdup, SHALLOWEST if surface == "interface" else 0.0)
+
+    def reaching(self, axis: int, value: float) -> Range:
+        """The range widened, as far as allowed, to ``value`` of the surface temperature or hold-up."""
+        if axis == LOG_M:
+            return replace(self, deepest=min(max(self.deepest, value), DEEPEST))
+        return replace(
+            self,
+            coldest=max(min(self.coldest, value), WIDEST[0]),
+            hottest=min(max(self.hottest, value), WIDEST[1]),
+        )
+
+    def contains(self, macroscopic: Array, margin: float = _ROUNDING) -> bool:
+        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, give or take ``margin``."""
+        return bool(
+            np.log(self.coldest) - margin <= macroscopic[LOG_T] <= np.log(self.hottest) + margin
+            and macroscopic[LOG_M] <= np.log(self.deepest) + margin
+            and (self.shallowest == 0.0 or macroscopic[LOG_M] >= np.log(self.shallowest) - margin)
+        )
+
+    def edge(self, macroscopic: Array, axis: int) -> int:
+        """-1 or 1 where a flow lies at the lower or upper edge of LOG_T, 1 at the edge of LOG_M, else 0."""
+        if axis == LOG_T and macroscopic[LOG_T] < np.log(self.coldest) + _NEAR:
+            return -1
+        upper = self.hottest if axis == LOG_T else self.deepest
+        return int(macroscopic[axis] > np.log(upper) - _NEAR)
+
+    def passed(self, macroscopic: Array) -> tuple[int, float, str]:
+        """Which edge a flow outside has passed: LOG_T or LOG_M, its value there, and in words."""
+        if macroscopic[LOG_M] > np.log(self.deepest):
+            return LOG_M, float(np.log(self.deepest)), f"it goes on to hold-ups above {self.deepest:g}"
+        if self.shallowest > 0.0 and macroscopic[LOG_M] < np.log(self.shallowest):
+            return LOG_M, float(np.log(self.shallowest)), "its hold-up vanishes"
+        if macroscopic[LOG_T] > np.log(self.hottest):
+            return (
+                LOG_T,
+                float(np.log(self.hottest)),
+                f"it goes on to surface temperatures above {self.hottest:g}",
+            )
+        return (
+            LOG_T,
+            float(np.log(self.coldest)),
+            f"it goes on to surface temperatures below {self.coldest:g}",
+        )

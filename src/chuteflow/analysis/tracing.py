@@ -1,0 +1,190 @@
+"""Families of flows as continuation problems, for the general continuation of chuteflow.numerics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from chuteflow.analysis.crossings import Chord
+from chuteflow.analysis.ranges import Range
+from chuteflow.errors import SolveError
+from chuteflow.numerics.chebyshev import Array, tail
+from chuteflow.numerics.continuation import Control, Point, trace
+from chuteflow.steady.collocation import LOG_M, Collocation
+from chuteflow.steady.solver import DEGREES, Solution, Status, default_stretch, solve, solve_many
+
+#: Decay of the coefficients between which a grid is kept while tracing.
+_RESOLVED, _WASTED = 1e-7, 1e-13
+#: The stretch is renewed when it is off by more.
+_STRETCH_OFF = 0.3
+#: Relative error allowed in the flows at the edges of a range while tracing.
+_EDGE_TOLERANCE = 1e-8
+#: Weight of the gradient in the inner product.
+_OF_GRADIENT = 0.02
+#: Flows are one and the same when all their logarithms agree to this.
+_SAME = 1e-7
+#: A flow is looked for on a chord if it lies within this many of its lengths beside it.
+_BESIDE = 0.25
+
+#: How families are followed: arclength is measured in the plane (theta_surface, ln M).
+CONTROL = Control(initial_step=0.05, min_step=1e-7, max_step=0.5, max_angle=0.3, tolerance=1e-8, max_points=2000)
+
+
+@dataclass(frozen=True, eq=False)
+class FamilySystem:
+    """The steady problem without a condition: one unknown more than equations.
+
+    The inner product is that of the plane (theta at the surface, ln M), with a little of the integral of g^2
+    over the overburden: enough to tell families that differ near the base alone. Neither resolution nor
+    stretch changes the path.
+    """
+
+    problem: Collocation
+
+    @property
+    def weights(self) -> Array:
+        """Of g, by quadrature, and 1 for theta at the surface and for ln M."""
+        by_quadrature = self.problem.grid.weights * self.problem.share[1]
+        return np.concatenate([_OF_GRADIENT * by_quadrature, [1.0, 1.0]])
+
+    def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
+        """See chuteflow.numerics.continuation.System."""
+        state = self.problem.state(z)
+        return state.residual(), state.jacobian()
+
+    def adapted(self, z: Array, tangent: Array) -> tuple[FamilySystem, Array, Array] | None:
+        """A finer or coarser grid, or another stretch, where the solution asks for it."""
+        problem = self.problem
+        state = problem.state(z)
+        decay = tail(problem.grid, state.y + 1e-30)
+        place = DEGREES.index(problem.degree)
+        if decay > _RESOLVED and place + 1 < len(DEGREES):
+            place += 1
+        elif decay < _WASTED and place > 0:
+            place -= 1
+        temperature = float(np.exp(state.log_t[0]))
+        stretch = default_stretch(problem.model, float(state.mass[0]), temperature)
+        if abs(stretch - problem.stretch) < _STRETCH_OFF:
+            if DEGREES[place] == problem.degree:
+                return None
+            stretch = problem.stretch
+        other, matrix = problem.transferred(DEGREES[place], stretch)
+        carried = [np.concatenate([matrix @ v[:-2], v[-2:]]) for v in (z, tangent)]
+        return FamilySystem(other), carried[0], carried[1]
+
+
+@dataclass(frozen=True, eq=False)
+class TracedFamily:
+    """A family as far as it goes within a range: solved flows in order, the last ones at the edges.
+
+    ``ends`` says in words why it ends at either side; a loop ends with its first flow.
+    """
+
+    solutions: tuple[Solution, ...]
+    ends: tuple[str, str]
+
+    @cached_property
+    def macroscopic(self) -> Array:
+        """ln Q, ln h, ln M, ln T_surface of the flows, (k, 4)."""
+        return np.array([s.macroscopic for s in self.solutions])
+
+    @cached_property
+    def arclength(self) -> Array:
+        """In the plane (ln M, ln T_surface) from the first flow, by chords, (k,)."""
+        chords = np.hypot(*np.diff(self.macroscopic[:, LOG_M:], axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(chords)])
+
+    def holds(self, solution: Solution) -> bool:
+        """Whether a solved flow is of this family: on one of its chords lies a flow equal to it."""
+        plane = self.macroscopic[:, LOG_M:]
+        chords = np.diff(plane, axis=0)
+        lengths = np.hypot(*chords.T)
+        gap = solution.macroscopic[LOG_M:] - plane[:-1]
+        sigma = (gap * chords).sum(axis=1) / np.maximum(lengths**2, 1e-300)
+        beside = np.hypot(*(gap - sigma[:, None] * chords).T)
+        near = (sigma > -_BESIDE) & (sigma < 1.0 + _BESIDE) & (beside < _BESIDE * lengths)
+        for i in np.flatnonzero(near).tolist():
+            chord = Chord(self.solutions[i], self.solutions[i + 1])
+            there = solve(*chord.start_at(float(sigma[i])), chord.condition_at(float(sigma[i])))
+            if there.converged and np.abs(there.macroscopic - solution.macroscopic).max() < _SAME:
+                return True
+        return False
+
+    def sampled(self, count: int, tolerance: float) -> list[Solution]:
+        """``count`` flows from end to end, evenly in arclength, each solved to ``tolerance``.
+
+        Raises:
+            SolveError: where one was not.
+        """
+        places = np.linspace(0.0, self.arclength[-1], count)
+        index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.solutions) - 2)
+        lengths = np.diff(self.arclength)
+        chords = [Chord(*pair, tolerance) for pair in pairwise(self.solutions)]
+        sigmas = (places - self.arclength[index]) / lengths[index]
+        starts = [chords[i].start_at(float(sigma)) for i, sigma in zip(index, sigmas, strict=True)]
+        planes = [chords[i].condition_at(float(sigma)) for i, sigma in zip(index, sigmas, strict=True)]
+        solutions = solve_many(starts, planes, tolerance)
+        for solution in solutions:
+            if not solution.converged:
+                raise SolveError(f"a flow of a family could not be solved: {solution.status.value}")
+        return solutions
+
+
+def traced(start: Solution, ahead: Array, within: Range, control: Control = CONTROL) -> TracedFamily:
+    """The family through ``start`` to both sides; there it goes along ``ahead`` (d ln M, d ln T_surface)."""
+    onward, end, closed = _side(start, ahead, within, control)
+    if closed:
+        return TracedFamily((*onward, onward[0]), (end, end))
+    back, begin, _ = _side(start, -ahead, within, control)
+    return TracedFamily((*back[:0:-1], *onward), (begin, end))
+
+
+def _side(start: Solution, ahead: Array, within: Range, control: Control) -> tuple[list[Solution], str, bool]:
+    """Flows from ``start`` to the edge of the range, why they end there, and whether they come back."""
+    direction = np.zeros_like(start.z)
+    direction[-1], direction[-2] = ahead
+    path = trace(FamilySystem(start.problem), start.z, direction=direction, control=control)
+    points: list[Point[FamilySystem]] = []
+    solutions: list[Solution] = []
+    for point in path:
+        if points and point.step == 0.0:
+            points.pop()
+            solutions.pop()  # the same flow on another grid
+        points.append(point)
+        solutions.append(_as_solution(point, control))
+        here = solutions[-1].macroscopic
+        if not within.contains(here):
+            axis, edge, words = within.passed(here)
+            if len(solutions) > 1:
+                solutions[-1] = _at_edge(solutions[-2], solutions[-1], axis, edge)
+            return solutions, words, False
+        if len(points) > 3 and _returned(points):
+            return solutions[:-1], "the family closes on itself", True
+    return solutions, path.status.value, False
+
+
+def _at_edge(inside: Solution, outside: Solution, axis: int, edge: float) -> Solution:
+    """The flow between two whose quantity ``axis`` is ``edge``; the one outside, if that is not resolved."""
+    ends = float(inside.macroscopic[axis]) - edge, float(outside.macroscopic[axis]) - edge
+    try:
+        return Chord(inside, outside, _EDGE_TOLERANCE).zero(lambda s: float(s.macroscopic[axis]) - edge, ends)
+    except SolveError:
+        return outside
+
+
+def _as_solution(point: Point[FamilySystem], control: Control) -> Solution:
+    problem = point.system.problem
+    macroscopic = problem.state(point.z).macroscopic()
+    return Solution(problem, point.z, macroscopic, control.tolerance, Status.CONVERGED)
+
+
+def _returned(points: list[Point[FamilySystem]]) -> bool:
+    """Whether the last step passed the first point, in the plane of the inner product, in its direction."""
+    (first, before, last) = (np.append(p.z[-2:], p.tangent[-2:]) for p in (points[0], points[-2], points[-1]))
+    step = last[:2] - before[:2]
+    share = float((first[:2] - before[:2]) @ step) / float(step @ step)
+    beside = float(np.hypot(*(before[:2] + share * step - first[:2])))
+    return 0.0 <= share < 1.0 and beside < 0.05 * float(np.hypot(*step)) and float(first[2:] @ last[2:]) > 0.9

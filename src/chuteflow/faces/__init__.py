@@ -1,0 +1,1 @@
+"""Plots, files, units and the command line: thin, no science in them."""

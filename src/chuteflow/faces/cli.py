@@ -1,0 +1,91 @@
+"""The command line ``chuteflow``: finds the command, and turns every outcome into an exit code.
+
+0 done, also when the answer is that there is no flow; 2 bad input and 1 failure, each with one line on
+standard error; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from io import TextIOWrapper
+
+import click
+
+from chuteflow import __version__
+from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.faces.commands import COMMANDS
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class Commands(click.Group):
+    """The table of commands, each imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All names."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of this name."""
+        if cmd_name not in COMMANDS:
+            return None
+        return import_module(f"chuteflow.faces.commands.{cmd_name}").command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the first argument names."""
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            raise click.UsageError(f"there is no command {args[0]!r}: choose one of {', '.join(COMMANDS)}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=Commands,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Each command explains itself: chuteflow solve --help",
+)
+@click.version_option(__version__, prog_name="chuteflow")
+def chuteflow() -> None:
+    """Every steady, fully developed flow of grains that an inclined chute can carry."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line, by default on the arguments of the process, and return its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # A terminal that knows no Greek still gets its answer.
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = chuteflow.main(arguments, prog_name="chuteflow", standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else DONE
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "chuteflow"
+        return _complain(f"{error.format_message().rstrip('.')} (see {where} --help)", BAD_INPUT)
+    except (click.ClickException, InputError) as error:
+        return _complain(str(error), BAD_INPUT)
+    except ChuteflowError as error:
+        return _complain(str(error), FAILED)
+    except (click.Abort, KeyboardInterrupt):
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read has gone; what is left in the buffer must not fail once more at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except OSError as error:
+        return _complain(f"cannot write the output: {error.strerror or error}", FAILED)
+
+
+def _complain(message: str, code: int) -> int:
+    click.echo("chuteflow: " + " ".join(message.split()), err=True)
+    return code

@@ -1,0 +1,71 @@
+"""``chuteflow figures``: draw figures of the paper, each with its data beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from chuteflow.errors import InputError
+from chuteflow.faces import options
+from chuteflow.faces.commands import COMMANDS
+from chuteflow.paper.figures import FIGURES, figure
+
+
+class Numbers(click.ParamType):
+    """Numbers of figures, separated by commas."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> list[int]:
+        """The numbers, in order and once each."""
+        try:
+            numbers = sorted({int(number) for number in value.split(",")})
+        except ValueError:
+            self.fail(f"{value!r}: write numbers separated by commas, for example 2,3", param, ctx)
+        unknown = [str(number) for number in numbers if number not in FIGURES]
+        if unknown:
+            known = ", ".join(map(str, FIGURES))
+            self.fail(f"there is no figure {' and no '.join(unknown)} here: choose from {known}", param, ctx)
+        return numbers
+
+
+_EPILOG = "Figures: " + "; ".join(f"{number}  {title}" for number, title in FIGURES.items())
+
+
+@click.command("figures", help=COMMANDS["figures"], epilog=_EPILOG)
+@options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
+@options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
+@options.option(
+    "--format",
+    "kind",
+    type=click.Choice(["png", "pdf", "svg"]),
+    help="Format of the pictures; png by default.",
+)
+def command(only: list[int] | None, out: str | None, kind: str | None) -> None:
+    """Compute, draw and write."""
+    folder = _directory(out or ".")
+    chosen = only or list(FIGURES)
+    names = {number: folder / f"figure_{number:02d}.{kind or 'png'}" for number in chosen}
+    from chuteflow.faces.plots import write_figure
+    from chuteflow.faces.writing import require_writable, written_beside
+    from chuteflow.paper.data import csv_text
+
+    for path in names.values():
+        require_writable(path, options.DRAWN)
+    for number, path in names.items():
+        data = figure(number).compute()
+        write_figure(figure(number).draw(data), path)
+        with written_beside(path.with_suffix(".csv")) as partial:
+            partial.write_text(csv_text(data), encoding="utf-8")
+        click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}")
+
+
+def _directory(name: str) -> Path:
+    folder = Path(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
+    return folder

@@ -1,0 +1,94 @@
+"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, depth or temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.faces import options
+from chuteflow.faces.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from chuteflow.analysis.results import FlowSet
+    from chuteflow.steady.quantities import Scales
+
+_EPILOG = (
+    "Numbers are dimensionless, in grain diameters d and sqrt(g d cos theta). With --diameter and --density "
+    'results are in SI units; an AMOUNT may then carry a unit too, such as --flux "0.7 kg/m/s", and is '
+    "dimensionless without one.\n\n"
+    "Example: chuteflow solve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3"
+)
+#: Columns of the table; the height of the interface is left out on the half-line.
+_COLUMNS = (
+    "mass_flux",
+    "centre_of_mass",
+    "mass_holdup",
+    "surface_temperature",
+    "base_temperature",
+    "base_volume_fraction",
+    "largest_volume_fraction",
+    "slip_velocity",
+    "depth",
+    "interface_height",
+)
+
+
+@click.command("solve", help=COMMANDS["solve"], epilog=_EPILOG)
+@options.chute_options
+@options.condition_options
+@options.search_options
+@options.output_options
+@options.scale_options
+def command(**given: Any) -> None:
+    """Solve, print, save and draw."""
+    chute = options.chute(given)
+    scales = options.scales(given)
+    condition = options.condition(given, chute, scales)
+    options.require_outputs(given)
+    from chuteflow.analysis.enumeration import flows
+
+    found = flows(chute, **condition, **options.search(given))
+    if given["save"]:
+        from chuteflow.faces.files import save
+
+        save(found, given["save"], scales=scales)
+    if given["plot"]:
+        from chuteflow.faces.plots import plot_flows, write_figure
+
+        write_figure(plot_flows(found, scales=scales), given["plot"])
+    if given["as_json"]:
+        from chuteflow.faces import contract
+
+        click.echo(contract.text(contract.flow_set_object(found, scales)))
+    else:
+        click.echo("\n".join(_report(found, scales)))
+
+
+def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
+    from chuteflow.faces import tables, words
+
+    yield words.chute(found.chute)
+    if scales is not None:
+        yield words.scales(scales)
+    if found.flows:
+        columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
+        header = [
+            ["", *cells, end] for cells, end in zip(tables.heading(columns, scales), ("error", "[1]"), strict=False)
+        ]
+        rows = [
+            [str(i), *tables.numbers(flow, columns, found.chute, scales), f"{flow.error:.0e}"]
+            for i, flow in enumerate(found, 1)
+        ]
+        yield ""
+        yield tables.table([*header, *rows])
+        yield ""
+        for i, flow in enumerate(found, 1):
+            yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
+        yield ""
+        largest = max(flow.error for flow in found)
+        yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
+    else:
+        yield words.in_own_units(f"no flow: {found.reason}", scales)
+    yield words.searched(found.searched, found.chute, scales)

@@ -1,0 +1,123 @@
+"""The JSON shapes that other programs rely on; the command line and the files print the same objects.
+
+Numbers are dimensionless, or in SI units where scales are given. What is not a finite number is null.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, Scales
+
+#: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
+PARAMETERS = {
+    "slope": "slope",
+    "e": "restitution",
+    "ew": "wall_restitution",
+    "roughness": "roughness",
+    "surface": "surface",
+    "closure": "closure",
+}
+#: The numbers that place a flow on a curve.
+PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+
+
+def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow solve --json`` prints."""
+    return {
+        "chute": chute_object(flow_set.chute),
+        "flows": [flow_object(flow, scales) for flow in flow_set],
+        "searched": _searched(flow_set.chute, flow_set.searched, scales),
+        "reason": flow_set.reason,
+        **_units(scales, NUMBERS),
+    }
+
+
+def single_flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
+    """One flow in the shape of a set of one, without the range searched."""
+    return {
+        "chute": chute_object(flow.chute),
+        "flows": [flow_object(flow, scales)],
+        **_units(scales, NUMBERS),
+    }
+
+
+def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow curve --json`` prints."""
+    return {
+        "chute": chute_object(curve.chute),
+        "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
+        "searched": _searched(curve.chute, curve.searched, scales),
+        "reason": curve.reason,
+        **_units(scales, PLACE),
+    }
+
+
+def chute_object(chute: Chute) -> dict[str, float | str]:
+    """The parameters of a chute."""
+    return {short: getattr(chute, name) for short, name in PARAMETERS.items()}
+
+
+def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, float | str | None]:
+    """One flow: every number of the registry by its symbol, and its kinds."""
+    return {
+        **_numbers(flow, NUMBERS, scales),
+        "interior": flow.interior,
+        "density": flow.density,
+        "error": finite(flow.error),
+    }
+
+
+def factor(name: str, chute: Chute, scales: Scales | None) -> float:
+    """What the dimensionless quantity ``name`` is multiplied with: 1 without scales."""
+    return 1.0 if scales is None else scales.factor(name, chute.slope)
+
+
+def finite(value: float) -> float | None:
+    """The number, or None for what JSON cannot hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def text(obj: Any) -> str:
+    """JSON text of an object, on one line.
+
+    Raises:
+        ValueError: for a number that is not finite.
+    """
+    return json.dumps(obj, allow_nan=False)
+
+
+def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[str, float | str | None]:
+    return {NUMBERS[name].symbol: finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in names}
+
+
+def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, Any]:
+    arrays = {
+        NUMBERS[name].symbol: [finite(value * factor(name, chute, scales)) for value in getattr(branch, name)]
+        for name in PLACE
+    }
+    special = [{"kind": point.kind, **_numbers(point.flow, PLACE, scales)} for point in branch.special]
+    return {**arrays, "special": special, "ends": list(branch.ends)}
+
+
+def _searched(chute: Chute, searched: Searched, scales: Scales | None) -> dict[str, Any]:
+    warmth = factor("surface_temperature", chute, scales)
+    return {
+        "T_surface": [finite(value * warmth) for value in searched.surface_temperature],
+        "M_max": finite(searched.largest_holdup * factor("mass_holdup", chute, scales)),
+    }
+
+
+def _units(scales: Scales | None, names: Iterable[str]) -> dict[str, Any]:
+    if scales is None:
+        return {}
+    return {
+        "units": {NUMBERS[name].symbol: NUMBERS[name].unit for name in names},
+        "scales": {"diameter": scales.diameter, "density": scales.density, "gravity": scales.gravity},
+    }

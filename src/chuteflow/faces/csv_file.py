@@ -1,0 +1,99 @@
+"""A result as CSV: one table between comment lines.
+
+One row for each height of each flow, or for a curve one row for each flow, the special points in their
+places. The comments above the table are for people; those below it hold the unknowns, as JSON.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from chuteflow import __version__
+from chuteflow.analysis.results import Curve
+from chuteflow.errors import InputError
+from chuteflow.faces import records
+from chuteflow.faces.contract import factor, finite
+from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
+from chuteflow.faces.references import PAPER, TITLES, numbers_are
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, Scales
+
+_HEAD, _ROW = "# restore: ", "# unknowns: "
+_KINDS = ("interior", "density", "error")
+
+
+def write(result: Result, path: Path, scales: Scales | None) -> None:
+    """Write ``result`` to ``path``."""
+    found = records.rows(result)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {line}\n" for line in _comments(result, scales))
+        _write_table(file, result, found, scales)
+        file.write(_HEAD + json.dumps(records.head(result) | {"rows": len(found)}, allow_nan=False) + "\n")
+        for row in found:
+            file.write(_ROW + json.dumps(records.unknowns(row), allow_nan=False) + "\n")
+
+
+def read(path: Path) -> Result:
+    """The result in the file.
+
+    Raises:
+        InputError: for a later or unknown format, or a file that is cut short.
+        ValueError, KeyError, TypeError: for a file that is not of this format.
+    """
+    with path.open(encoding="utf-8") as file:
+        lines = [line for line in file if line.startswith("#")]
+    heads = [line.removeprefix(_HEAD) for line in lines if line.startswith(_HEAD)]
+    if len(heads) != 1:
+        raise InputError("it is cut short, or was not written by chuteflow")
+    head = json.loads(heads[0])
+    records.require_format(head)
+    chute = records.chute_from(head["chute"])
+    kept = [json.loads(line.removeprefix(_ROW)) for line in lines if line.startswith(_ROW)]
+    if len(kept) != head["rows"]:
+        raise InputError(f"it is cut short: {len(kept)} of {head['rows']} flows are in it")
+    return records.rebuilt(head, [records.row_from(chute, row) for row in kept])
+
+
+def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
+    yield f"chuteflow {__version__}: {TITLES[KIND_OF[type(result)]]}"
+    yield "theory: " + PAPER
+    yield "chute: " + ", ".join(f"{name} = {value}" for name, value in result.chute.as_dict().items())
+    if not isinstance(result, Flow):
+        low, high = result.searched.surface_temperature
+        deepest = result.searched.largest_holdup
+        yield f"searched (dimensionless): surface_temperature {low} to {high}, mass_holdup up to {deepest}"
+        yield f"tolerance: {result.tolerance} relative in mass_flux, centre_of_mass and mass_holdup"
+        if result.reason:
+            yield f"no flow: {result.reason}"
+    yield numbers_are(scales)
+    names = [*NUMBERS] if isinstance(result, Curve) else [*NUMBERS, *FIELDS]
+    for name in names:
+        quantity = QUANTITIES[name]
+        unit = "" if scales is None else f" [{quantity.unit}]"
+        yield f"{name}: {quantity.symbol}{unit}, {quantity.description}, {quantity.equation}"
+    yield "error: estimated relative error of mass_flux, centre_of_mass and mass_holdup, the largest"
+
+
+def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Scales | None) -> None:
+    table = csv.writer(file, lineterminator="\n")
+    if isinstance(result, Curve):
+        table.writerow(["branch", "special", *NUMBERS, *_KINDS])
+        table.writerows([row.branch, row.special, *_numbers(row.flow, scales)] for row in found)
+        return
+    table.writerow(["flow", *FIELDS, *NUMBERS, *_KINDS])
+    for i, row in enumerate(found):
+        profile = row.flow.sampled(HEIGHTS)
+        numbers = _numbers(row.flow, scales)
+        columns = [getattr(profile, name) * factor(name, row.flow.chute, scales) for name in FIELDS]
+        for values in zip(*columns, strict=True):
+            table.writerow([i, *map(float, values), *numbers])
+
+
+def _numbers(flow: Flow, scales: Scales | None) -> list[Any]:
+    """The numbers and kinds of a flow; what is not finite is an empty cell."""
+    numbers = [finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in NUMBERS]
+    return [*numbers, flow.interior, flow.density, finite(flow.error)]

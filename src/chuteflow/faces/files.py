@@ -1,0 +1,52 @@
+"""Results to files and back: NetCDF, CSV or JSON, by the ending of the name."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from pathlib import Path
+
+from chuteflow.errors import InputError
+from chuteflow.faces.records import KIND_OF, Result
+from chuteflow.faces.writing import require_suffix, require_writable, written_beside
+from chuteflow.steady.quantities import Scales
+
+#: The module of each format, imported when it is needed; each has write(result, path, scales) and read(path).
+FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
+#: What reading a damaged file may raise.
+_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)
+
+
+def save(result: Result, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
+    """Write a flow, a set of flows or a curve to ``path``: .nc (NetCDF 4, CF conventions), .csv or .json.
+
+    The file holds every number of the registry; .nc and, but for curves, .csv also the profiles of all fields
+    up to the depth. Numbers are dimensionless, or in SI units where ``scales`` are given. :func:`load` gives
+    the result back to the last bit in either case. The file is whole or absent.
+
+    Raises:
+        InputError: for a result or an ending that is not known, or a file that cannot be written.
+    """
+    if type(result) not in KIND_OF:
+        raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows or a curve")
+    writer = import_module(f"chuteflow.faces.{FORMATS[require_writable(path, tuple(FORMATS))]}")
+    with written_beside(path) as partial:
+        writer.write(result, partial, scales)
+
+
+def load(path: str | os.PathLike[str]) -> Result:
+    """The flow, set of flows or curve that :func:`save` wrote to ``path``; its numbers are dimensionless.
+
+    Raises:
+        InputError: for a file that is missing, damaged, of another program or of a later version.
+    """
+    reader = import_module(f"chuteflow.faces.{FORMATS[require_suffix(path, tuple(FORMATS))]}")
+    try:
+        return reader.read(Path(path))
+    except InputError as error:
+        raise InputError(f"cannot load {path}: {error}") from None
+    except OSError as error:
+        what = error.strerror or "it is not a file of this format"
+        raise InputError(f"cannot load {path}: {what}") from None
+    except _DAMAGE:
+        raise InputError(f"cannot load {path}: it is damaged, or was not written by chuteflow") from None

@@ -1,0 +1,44 @@
+"""A result as JSON: the object of the command line's ``--json``, and beside it what restores the result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from chuteflow import __version__
+from chuteflow.analysis.results import FlowSet
+from chuteflow.faces import contract, records
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import Scales
+
+
+def write(result: records.Result, path: Path, scales: Scales | None) -> None:
+    """Write ``result`` to ``path``; a single flow has the shape of a set of one."""
+    kept = [records.unknowns(row) for row in records.rows(result)]
+    whole = _readable(result, scales) | {
+        "source": f"chuteflow {__version__}",
+        "restore": records.head(result) | {"rows": kept},
+    }
+    path.write_text(contract.text(whole) + "\n", encoding="utf-8")
+
+
+def read(path: Path) -> records.Result:
+    """The result in the file.
+
+    Raises:
+        InputError: for a later or unknown format.
+        ValueError, KeyError, TypeError: for a file that is not of this format.
+    """
+    kept = json.loads(path.read_text(encoding="utf-8"))["restore"]
+    records.require_format(kept)
+    chute = records.chute_from(kept["chute"])
+    return records.rebuilt(kept, [records.row_from(chute, row) for row in kept["rows"]])
+
+
+def _readable(result: records.Result, scales: Scales | None) -> dict[str, Any]:
+    if isinstance(result, Flow):
+        return contract.single_flow_object(result, scales)
+    if isinstance(result, FlowSet):
+        return contract.flow_set_object(result, scales)
+    return contract.curve_object(result, scales)

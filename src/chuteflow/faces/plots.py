@@ -1,0 +1,172 @@
+"""Pictures of results, in the style of the paper's figures; matplotlib is imported when one is drawn."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow.analysis.results import KINDS, Curve, FlowSet
+from chuteflow.faces import words
+from chuteflow.faces.contract import PLACE, factor
+from chuteflow.faces.tables import number
+from chuteflow.faces.writing import require_writable, written_beside
+from chuteflow.paper import style
+from chuteflow.paper.branches import runs
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, Scales
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Endings that figures are written with.
+SUFFIXES = (".png", ".pdf", ".svg")
+_FIELDS = ("volume_fraction", "granular_temperature", "velocity")
+_PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"), ("mass_holdup", "centre_of_mass"))
+_POINTS = 401
+#: Profiles are drawn up to so many times the largest centre of mass.
+_TOP = 2.5
+#: Markers and names of the kinds of special points; a kind without is a star.
+_MARKERS = {
+    "fold-Q": ("o", "fold in $Q$"),
+    "fold-M": ("s", "fold in $M$"),
+    "fold-T": ("^", r"fold in $T_\infty$"),
+    "density-inversion": ("D", "onset of density inversion"),
+    "interior-change": ("v", "change of interior"),
+}
+_RESOLUTION = 300
+
+
+def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
+    """Profiles of volume fraction, temperature and velocity, each flow with its own colour and dashes.
+
+    Heights and fields are dimensionless, or in SI units where ``scales`` are given.
+    """
+    chute = flow_set.chute
+    if not len(flow_set):
+        return _none(chute, flow_set.reason)
+    figure, axes = style.panels(3, height=2.9 + 0.17 * len(flow_set), shared_y=True)
+    top = _TOP * max(flow.centre_of_mass for flow in flow_set)
+    for i, flow in enumerate(flow_set):
+        profile = flow.sampled(_POINTS, min(top, flow.interface_height))
+        for ax, field in zip(axes, _FIELDS, strict=True):
+            ax.plot(
+                getattr(profile, field) * factor(field, chute, scales),
+                profile.height * factor("height", chute, scales),
+                label=f"{words.among(flow, flow_set)}: {_numbers_of(flow, chute, scales)}",
+                **style.stroke(i).line(),
+            )
+    for ax, field in zip(axes, _FIELDS, strict=True):
+        style.name_axes(ax, style.label(field, scales), style.label("height", scales) if ax is axes[0] else None)
+        ax.set_xlim(left=0.0)
+        ax.set_ylim(0.0, top * factor("height", chute, scales))
+    style.caption(figure, _parameters(chute))
+    style.legend(figure, handles=axes[0].get_lines(), loc="outside lower center")
+    return figure
+
+
+def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
+    """Centre of mass, hold-up and flux against one another along every branch, special points marked.
+
+    Solid where the density is inverted, dashed where it is monotonic. Axes are logarithmic where the branches
+    span much.
+    """
+    if not curve.branches:
+        return _none(curve.chute, curve.reason)
+    figure, axes = style.panels(3, height=3.2)
+    for ax, pair in zip(axes, _PANELS, strict=True):
+        for i, branch in enumerate(curve.branches):
+            colour = _colour(i, curve)
+            for run in runs(branch):
+                x, y = (_values(run.flows, name, curve, scales) for name in pair)
+                ax.plot(x, y, **style.Stroke(colour, style.OF_DENSITY[run.density]).line())
+        _mark(ax, curve, pair, scales)
+        for axis, name in zip("xy", pair, strict=True):
+            style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
+        style.name_axes(ax, *(style.label(name, scales) for name in pair))
+    style.caption(figure, _parameters(curve.chute))
+    style.legend(figure, handles=list(_key(curve)), loc="outside lower center", ncols=4)
+    return figure
+
+
+def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write ``figure`` to ``path``: .png, .pdf or .svg, whole or not at all.
+
+    Raises:
+        InputError: for another ending, or a file that cannot be written.
+    """
+    suffix = require_writable(path, SUFFIXES)
+    # Pictures of one result are the same bytes, whenever they are drawn.
+    undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(suffix, {})
+    with written_beside(path) as partial:
+        figure.savefig(partial, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+
+
+def _none(chute: Chute, reason: str | None) -> Figure:
+    figure = style.sentence(f"No flow: {reason}.")
+    style.caption(figure, _parameters(chute))
+    return figure
+
+
+def _parameters(chute: Chute) -> str:
+    surface = {"free": "free surface", "interface": "interface"}[chute.surface]
+    return (
+        rf"$\tan\theta = {chute.slope:g}$, $e = {chute.restitution:g}$, $e_w = {chute.wall_restitution:g}$, "
+        rf"$r = {chute.roughness:.4g}$, {surface}, closure {chute.closure}"
+    )
+
+
+def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:
+    units = {name: "" if scales is None else f" {style.printed(NUMBERS[name].unit)}" for name in PLACE}
+    return ", ".join(
+        f"${NUMBERS[name].latex} = {number(getattr(flow, name) * factor(name, chute, scales))}${units[name]}"
+        for name in PLACE
+    )
+
+
+def _values(flows: Sequence[Flow], name: str, curve: Curve, scales: Scales | None) -> Any:
+    return np.array([getattr(flow, name) for flow in flows]) * factor(name, curve.chute, scales)
+
+
+def _mark(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:
+    for branch in curve.branches:
+        for point in branch.special:
+            x, y = (_values([point.flow], name, curve, scales) for name in pair)
+            ax.plot(x, y, **_marker(point.kind))
+
+
+def _colour(index: int, curve: Curve) -> str:
+    return style.BLACK if len(curve.branches) == 1 else style.stroke(index).colour
+
+
+def _marker(kind: str) -> dict[str, Any]:
+    return {
+        "marker": _MARKERS.get(kind, ("*", kind))[0],
+        "markersize": 4.5,
+        "markerfacecolor": "white",
+        "markeredgecolor": style.BLACK,
+        "markeredgewidth": 0.9,
+        "linestyle": "none",
+        "zorder": 3,
+    }
+
+
+def _key(curve: Curve) -> Iterator[Any]:
+    """Entries of the legend: families if there are several, the kinds of density and of special points."""
+    from matplotlib.lines import Line2D
+
+    if len(curve.branches) > 1:
+        for i in range(len(curve.branches)):
+            yield Line2D([], [], label=f"family {i + 1}", **style.Stroke(_colour(i, curve)).line())
+    densities = {run.density for branch in curve.branches for run in runs(branch)}
+    for density, dashes in style.OF_DENSITY.items():
+        if density in densities:
+            yield Line2D([], [], label=f"density {density}", **style.Stroke(style.BLACK, dashes).line())
+    found = {point.kind for branch in curve.branches for point in branch.special}
+    for kind in KINDS:
+        if kind in found:
+            yield Line2D([], [], label=_MARKERS.get(kind, ("*", kind))[1], **_marker(kind))

@@ -1,0 +1,105 @@
+"""Flows, chutes and ranges said in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from chuteflow.analysis.results import Curve, Searched
+from chuteflow.faces.contract import factor
+from chuteflow.faces.tables import number
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, Scales
+
+#: What the flow with the largest and the one with the smallest of a number is called among others.
+_SIDES = (
+    ("surface_temperature", "hot", "cold"),
+    ("largest_volume_fraction", "dense", "dilute"),
+    ("centre_of_mass", "deep", "shallow"),
+)
+#: Relative differences below this distinguish nothing.
+_EQUAL = 1e-6
+_DENSITIES = {
+    "monotonic": "density falls with height everywhere (monotonic)",
+    "inverted": "densest above the base (density inverted)",
+}
+_INTERIORS = {
+    "dissipative": "interior dissipative throughout",
+    "productive": "interior productive throughout",
+    "mixed": "interior productive in some places and dissipative in others (mixed)",
+}
+_SURFACES = {"free": "free surface", "interface": "interface with free grains above"}
+
+
+def among(flow: Flow, flows: Sequence[Flow]) -> str:
+    """What tells ``flow`` from the others, such as "hot, dilute, deep"."""
+    if len(flows) < 2:
+        return "the only flow"
+    told = []
+    for name, largest, smallest in _SIDES:
+        values = [getattr(other, name) for other in flows]
+        if max(values) - min(values) > _EQUAL * max(values):
+            told += {max(values): [largest], min(values): [smallest]}.get(getattr(flow, name), [])
+    return ", ".join(told) if told else "in between"
+
+
+def kinds(flow: Flow) -> str:
+    """Density and interior of ``flow``."""
+    return f"{_DENSITIES[flow.density]}; {_INTERIORS[flow.interior]}"
+
+
+def chute(chute: Chute) -> str:
+    """All parameters of ``chute``."""
+    return (
+        f"chute: tan(theta) = {chute.slope:g} ({chute.angle:.4g} degrees), e = {chute.restitution:g}, "
+        f"e_w = {chute.wall_restitution:g}, r = {chute.roughness:g}, {_SURFACES[chute.surface]}, "
+        f"closure {chute.closure}"
+    )
+
+
+def scales(scales: Scales) -> str:
+    """The grains behind results in SI units."""
+    grains = f"grains: diameter {scales.diameter:g} m, density {scales.density:g} kg/m^3"
+    return f"{grains}; gravity {scales.gravity:g} m/s^2"
+
+
+def in_own_units(sentence: str, scales: Scales | None) -> str:
+    """A sentence of the analyses, whose numbers stay dimensionless beside results in SI units."""
+    return sentence if scales is None else f"{sentence} (dimensionless)"
+
+
+def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
+    """The range searched."""
+    warmth, mass = factor("surface_temperature", chute, scales), factor("mass_holdup", chute, scales)
+    low, high = (value * warmth for value in range_.surface_temperature)
+    return (
+        f"searched: T_surface from {low:.4g} to {high:.4g}{_unit('surface_temperature', scales)}, "
+        f"M up to {range_.largest_holdup * mass:.4g}{_unit('mass_holdup', scales)}"
+    )
+
+
+def multiplicity(curve: Curve, scales: Scales | None) -> str:
+    """How many flows share one mass flux, from folds and ends of the branches."""
+    stretches: list[tuple[float, float]] = []
+    for branch in curve.branches:
+        turns = [point.flow.mass_flux for point in branch.special if point.kind == "fold-Q"]
+        stops = [branch.flows[0].mass_flux, *turns, branch.flows[-1].mass_flux]
+        stretches += [(min(pair), max(pair)) for pair in pairwise(stops)]
+    edges = sorted({edge for stretch in stretches for edge in stretch})
+    counted: list[tuple[int, float, float]] = []
+    for low, high in pairwise(edges):
+        count = sum(first <= low and high <= last for first, last in stretches)
+        if counted and counted[-1][0] == count:
+            counted[-1] = (count, counted[-1][1], high)
+        else:
+            counted.append((count, low, high))
+    flux = factor("mass_flux", curve.chute, scales)
+    said = [
+        f"{count} for Q from {number(low * flux)} to {number(high * flux)}" for count, low, high in counted if count
+    ]
+    return f"flows that share one mass flux: {', '.join(said)}{_unit('mass_flux', scales)}"
+
+
+def _unit(name: str, scales: Scales | None) -> str:
+    return "" if scales is None else f" {NUMBERS[name].unit}"

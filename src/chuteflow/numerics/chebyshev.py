@@ -1,0 +1,111 @@
+"""Chebyshev grids on [0, 1]: nodes, differentiation, quadrature, coefficients, interpolation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Chebyshev extrema on [0, 1], ascending.
+
+    ``nodes`` (n+1,); ``derivative`` (n+1, n+1), the exact derivative of the interpolant; ``integral``
+    (n+1, n+1), its exact integral from 0;
+    ``weights`` (n+1,) of Clenshaw-Curtis quadrature; ``to_coefficients`` (n+1, n+1), values to Chebyshev
+    coefficients in 2 s - 1; ``barycentric`` (n+1,) weights.
+    """
+
+    nodes: Array
+    derivative: Array
+    integral: Array
+    weights: Array
+    to_coefficients: Array
+    barycentric: Array
+
+    @property
+    def degree(self) -> int:
+        """Degree n of the interpolant."""
+        return len(self.nodes) - 1
+
+
+@lru_cache(maxsize=64)
+def grid(degree: int) -> Grid:
+    """The grid of ``degree`` + 1 Chebyshev extrema on [0, 1] (Trefethen 2000, Spectral Methods in MATLAB).
+
+    Raises:
+        ValueError: for a degree below 2.
+    """
+    if degree < 2:
+        raise ValueError(f"degree {degree}: at least 2 is needed")
+    n = degree
+    j = np.arange(n + 1)
+    # sin^2 keeps the spacing at s = 0 exact to the last digit, where cold flows have their thin layer.
+    nodes = np.sin(0.5 * np.pi * j / n) ** 2
+    sign = np.where(j % 2 == 0, 1.0, -1.0)
+    barycentric = sign.copy()
+    barycentric[[0, -1]] *= 0.5
+    angle = np.pi * j / n
+    # s_i - s_k = sin((a_i + a_k)/2) sin((a_i - a_k)/2): no cancellation.
+    gap = np.sin(0.5 * (angle[:, None] + angle)) * np.sin(0.5 * (angle[:, None] - angle))
+    np.fill_diagonal(gap, 1.0)
+    derivative = barycentric / barycentric[:, None] / gap
+    np.fill_diagonal(derivative, 0.0)
+    np.fill_diagonal(derivative, -derivative.sum(axis=1))
+    # x_j = 2 s_j - 1 = -cos(angle_j)
+    basis = np.cos(np.outer(j, np.pi - angle))
+    halves = np.ones(n + 1)
+    halves[[0, -1]] = 0.5
+    to_coefficients = 2.0 / n * halves[:, None] * basis * halves
+    integral = _integrals_of_basis(angle) @ to_coefficients
+    integral[0] = 0.0
+    weights = integral[-1].copy()
+    for array in (nodes, derivative, integral, weights, to_coefficients, barycentric):
+        array.setflags(write=False)
+    return Grid(nodes, derivative, integral, weights, to_coefficients, barycentric)
+
+
+def _integrals_of_basis(angle: Array) -> Array:
+    """Integrals of T_k(2 s - 1) from 0 to the nodes, column k; T_k = cos(k acos x), x = -cos(angle)."""
+    n = len(angle) - 1
+    k = np.arange(n + 1)
+    t = np.cos(np.outer(np.pi - angle, np.arange(n + 2)))  # T_0 ... T_{n+1} at the nodes
+    end = (-1.0) ** np.arange(n + 2)
+    out = np.empty((n + 1, n + 1))
+    out[:, 0] = 0.5 * (t[:, 1] - end[1])
+    out[:, 1] = 0.125 * (t[:, 2] - end[2])
+    up, down = k[2:] + 1, k[2:] - 1
+    out[:, 2:] = 0.25 * ((t[:, up] - end[up]) / up - (t[:, down] - end[down]) / down)
+    return out
+
+
+def interpolation_matrix(g: Grid, points: Array) -> Array:
+    """Matrix (m, n+1) that takes values at the nodes to values at ``points`` (m,) in [0, 1]."""
+    gap = points[:, None] - g.nodes
+    hit = gap == 0.0
+    gap[hit] = 1.0
+    matrix = g.barycentric / gap
+    rows = hit.any(axis=1)
+    matrix[rows] = hit[rows]
+    return cast(Array, matrix / matrix.sum(axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=256)
+def refinement(coarse: int, fine: int) -> Array:
+    """Matrix (fine+1, coarse+1) from the grid of degree ``coarse`` to that of degree ``fine``."""
+    matrix = interpolation_matrix(grid(coarse), grid(fine).nodes)
+    matrix.setflags(write=False)
+    return matrix
+
+
+def tail(g: Grid, values: Array) -> float:
+    """Relative size of the last coefficients of ``values`` (..., n+1): how far the series has decayed."""
+    coefficients = np.abs(values @ g.to_coefficients.T)
+    last = max(2, g.degree // 8)
+    return float(coefficients[..., -last:].max() / (coefficients.max() + 1e-300))

@@ -1,0 +1,119 @@
+"""Q-h curves of several chutes: the data and the lines of figures 4, 6, 8, 9, 10 and 17."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow import Branch, Chute, Curve, curve
+from chuteflow.paper import style
+from chuteflow.paper.branches import Point, in_order, runs
+from chuteflow.paper.data import Table, chute_note, stacked
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Curves by ``names``, which are the values of ``key``, a parameter in which the chutes differ."""
+
+    title: str
+    key: str
+    curves: dict[Any, Curve]
+
+    def table(self) -> Table:
+        """The branches of all curves, special points in their places, one below the other."""
+        groups = {
+            (name, number): _columns(list(in_order(branch)), number)
+            for name, found in self.curves.items()
+            for number, branch in enumerate(found.branches, 1)
+        }
+        columns = stacked(self.key, groups)
+        columns[self.key] = [name for name, _ in columns[self.key]]
+        low, high = next(iter(self.curves.values())).searched.surface_temperature
+        traced = f"all flows with surface temperatures from {low} to {high}"
+        return Table(self.title, (traced, *(chute_note(found.chute) for found in self.curves.values())), columns)
+
+    def flows_at(self, name: Any, mass_flux: float) -> int:
+        """How many flows of a curve have this mass flux, counted between its points."""
+        return sum(
+            int(np.count_nonzero(np.diff(branch.mass_flux > mass_flux))) for branch in self.curves[name].branches
+        )
+
+
+def _columns(points: list[Point], number: int) -> dict[str, list[Any]]:
+    return {
+        "branch": [number] * len(points),
+        **{name: [getattr(point.flow, name) for point in points] for name in NUMBERS},
+        "density": [point.flow.density for point in points],
+        "special": [point.special for point in points],
+    }
+
+
+def trace(
+    title: str,
+    key: str,
+    chutes: Iterable[Chute],
+    surface_temperature: tuple[float, float] = (1e-3, 1e4),
+    points: int = 150,
+) -> Curves:
+    """The curves of ``chutes``, which differ in ``key``."""
+    found = (curve(chute, surface_temperature=surface_temperature, points=points) for chute in chutes)
+    return Curves(title, key, {getattr(c.chute, key): c for c in found})
+
+
+def draw_densities(ax: Axes, found: Curve, **settings: Any) -> None:
+    """Centre of mass against mass flux: solid where the density is inverted, dashed where it is monotonic."""
+    for branch in found.branches:
+        for run in runs(branch):
+            stroke = style.Stroke(style.BLACK, style.OF_DENSITY[run.density])
+            ax.plot(
+                [flow.mass_flux for flow in run.flows],
+                [flow.centre_of_mass for flow in run.flows],
+                **stroke.line() | settings,
+            )
+
+
+def draw_plain(ax: Axes, found: Curve, stroke: style.Stroke, name: str | None = None) -> None:
+    """Centre of mass against mass flux in one stroke."""
+    for i, branch in enumerate(found.branches):
+        points = [point.flow for point in in_order(branch)]
+        ax.plot(
+            [flow.mass_flux for flow in points],
+            [flow.centre_of_mass for flow in points],
+            label=name if i == 0 else None,
+            **stroke.line(),
+        )
+
+
+def hot_end(branch: Branch, centre_of_mass: float) -> float:
+    """Mass flux where the hot end of ``branch`` passes through ``centre_of_mass``, of the plotted line."""
+    h, q = branch.centre_of_mass, branch.mass_flux
+    below = int(np.argmax(h < centre_of_mass))
+    return float(np.interp(centre_of_mass, h[[below, below - 1]], q[[below, below - 1]]))
+
+
+def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, top: float, head: float = 0.84) -> None:
+    """The slopes at the hot ends of their curves, where these leave the panel at ``top``, under a heading.
+
+    The heading ends at the share ``head`` of the width.
+    """
+    places = sorted((hot_end(found.curves[name].branches[0], top), name) for name in names)
+    x = 0.04 * right  # clear of the letter of the panel
+    for place, name in places:
+        x = max(place, x + 0.034 * right)
+        style.write(ax, x, top, f"{name:.2f}", xytext=(1.0, 2.0), rotation=60, rotation_mode="anchor", ha="left")
+    style.write(ax, head * right, top, r"slope $\tan\theta$", xytext=(0.0, 13.0), ha="right")
+
+
+def frame(ax: Axes, right: float, top: float, *, ordinate: bool = True) -> None:
+    """Axes from zero with the labels of mass flux and centre of mass."""
+    style.name_axes(ax, style.label("mass_flux"), style.label("centre_of_mass") if ordinate else None)
+    ax.set_xlim(0.0, right)
+    ax.set_ylim(0.0, top)

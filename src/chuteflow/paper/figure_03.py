@@ -1,0 +1,83 @@
+"""Figure 3: centre of mass, mass hold-up and mass flux along the family of flows at tan(theta) = 0.3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow import Branch, Curve, Flow, curve, flows
+from chuteflow.paper import style
+from chuteflow.paper.branches import in_order
+from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.materials import dissipative
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MASS_FLUX = 3.0
+SLOPE = 0.3
+#: Surface temperatures traced; the flows drawn lie well inside.
+SURFACE_TEMPERATURE = (1e-3, 100.0)
+POINTS = 400
+#: Abscissa and ordinate of each panel, where the panel ends, and where the flows are named.
+PANELS = (
+    ("mass_flux", "centre_of_mass", 6.0, 15.0, ("right", "above right", "above left")),
+    ("mass_flux", "mass_holdup", 6.0, 1.6, ("below", "above left", "above")),
+    ("mass_holdup", "centre_of_mass", 1.6, 15.0, ("right", "above right", "above right")),
+)
+NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+
+
+@dataclass(frozen=True, eq=False)
+class Figure3:
+    """The curve, and the flows of figure 2 by name."""
+
+    curve: Curve
+    flows: dict[str, Flow]
+
+    def table(self) -> Table:
+        """The branches and then the named flows, one below the other."""
+        groups: dict[Any, dict[str, Any]] = {
+            f"family {i}": _columns([point.flow for point in in_order(branch)])
+            for i, branch in enumerate(self.curve.branches, 1)
+        }
+        groups |= {name: _columns([flow]) for name, flow in self.flows.items()}
+        special = [
+            f"{point.kind} at Q = {point.flow.mass_flux}, h = {point.flow.centre_of_mass}"
+            for branch in self.curve.branches
+            for point in branch.special
+        ]
+        title = "Figure 3: centre of mass, mass hold-up and mass flux of all flows"
+        return Table(title, (chute_note(self.curve.chute), *special), stacked("flows", groups))
+
+
+def compute() -> Figure3:
+    """The family of flows, and its flows at Q = 3."""
+    chute = dissipative(SLOPE)
+    traced = curve(chute, surface_temperature=SURFACE_TEMPERATURE, points=POINTS)
+    return Figure3(traced, dict(zip("ABC", flows(chute, Q=MASS_FLUX), strict=True)))
+
+
+def draw(data: Figure3) -> Figure:
+    """Three panels, the flows of figure 2 marked."""
+    figure, axes = style.panels(3)
+    for ax, (x, y, right, top, sides) in zip(axes, PANELS, strict=True):
+        for branch in data.curve.branches:
+            ax.plot(*_line(branch, x, y), **style.Stroke().line())
+        for side, (name, flow) in zip(sides, data.flows.items(), strict=True):
+            style.name_point(ax, getattr(flow, x), getattr(flow, y), name, side)
+        style.name_axes(ax, style.label(x), style.label(y))
+        ax.set_xlim(0.0, right)
+        ax.set_ylim(0.0, top)
+    return figure
+
+
+def _line(branch: Branch, x: str, y: str) -> tuple[Any, Any]:
+    columns = _columns([point.flow for point in in_order(branch)])
+    return columns[x], columns[y]
+
+
+def _columns(found: list[Flow]) -> dict[str, Any]:
+    return {name: np.array([getattr(flow, name) for flow in found]) for name in NUMBERS}

@@ -1,0 +1,77 @@
+"""Figure 5: volume fraction, granular temperature and velocity of a productive flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chuteflow import Flow, Profile, flows
+from chuteflow.paper import style
+from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.materials import productive
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MASS_FLUX = 3.0
+SLOPE = 0.4
+#: Highest point drawn, in grain diameters, and ends of the panels.
+TOP = 250.0
+POINTS = 1001
+FIELDS = ("volume_fraction", "granular_temperature", "velocity")
+LIMITS = ((0.0, 0.01), (33.5, 36.0), (0.0, 15.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Figure5:
+    """The flow, its profile, and its largest temperature with the height where it is."""
+
+    flow: Flow
+    profile: Profile
+    largest_temperature: float
+    height_of_largest: float
+
+    def table(self) -> Table:
+        """The profile."""
+        notes = (
+            chute_note(self.flow.chute),
+            f"T_surface = {self.flow.surface_temperature}, h = {self.flow.centre_of_mass}, "
+            f"M = {self.flow.mass_holdup}, estimated relative error {self.flow.error}",
+            f"largest temperature {self.largest_temperature} at the height {self.height_of_largest}",
+        )
+        columns = {name: getattr(self.profile, name).tolist() for name in ("height", *FIELDS)}
+        return Table(f"Figure 5: profiles of the productive flow with mass flux {MASS_FLUX}", notes, columns)
+
+
+def compute() -> Figure5:
+    """The one flow and its profile."""
+    (flow,) = flows(productive(SLOPE), Q=MASS_FLUX)
+    profile = flow.profile(np.linspace(0.0, TOP, POINTS))
+    hottest = int(np.argmax(profile.granular_temperature))
+    below, above = profile.height[max(hottest - 1, 0)], profile.height[min(hottest + 1, POINTS - 1)]
+    around = flow.profile(np.linspace(below, above, 2001))
+    hottest = int(np.argmax(around.granular_temperature))
+    return Figure5(flow, profile, float(around.granular_temperature[hottest]), float(around.height[hottest]))
+
+
+def draw(data: Figure5) -> Figure:
+    """Three panels, height upwards; the maximum of the temperature enlarged."""
+    figure, axes = style.panels(3, shared_y=True)
+    for ax, field, limits in zip(axes, FIELDS, LIMITS, strict=True):
+        ax.plot(getattr(data.profile, field), data.profile.height, **style.Stroke().line())
+        style.name_axes(ax, style.label(field), style.label("height") if ax is axes[0] else None)
+        ax.set_xlim(*limits)
+        ax.set_ylim(0.0, TOP)
+    axes[0].set_xticks([0.0, 0.005, 0.01])
+    far = data.flow.surface_temperature
+    excess = data.largest_temperature - far
+    small = style.inset(axes[1], (0.2, 0.3, 0.42, 0.55))
+    small.plot((data.profile.granular_temperature - far) / excess, data.profile.height, **style.Stroke().line())
+    small.axvline(0.0, **style.Stroke(style.GREY, style.DASHED).line(0.8))
+    small.plot([1.0], [data.height_of_largest], marker="o", markersize=3.0, color=style.BLACK)
+    small.set(xlim=(-1.5, 1.5), ylim=(0.0, TOP), xticks=[0.0, 1.0], yticks=[0.0, TOP])
+    small.set_xticklabels(["0", f"{1e4 * excess:.1f}"])
+    style.name_axes(small, r"$10^4\,(T - T_\infty)$", None)
+    return figure

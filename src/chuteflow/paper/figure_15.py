@@ -1,0 +1,88 @@
+"""Figure 15: the three flows at Q = 3 with the reduced heat flux, against those with the modified Fourier heat flux."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chuteflow import Flow, Profile, flows
+from chuteflow.paper import style
+from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.materials import dissipative
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MASS_FLUX = 3.0
+SLOPE = 0.3
+POINTS = 401
+FIELDS = ("volume_fraction", "granular_temperature", "velocity")
+#: The flows from hot to cold: the upper end of their panels, and the lower and upper ends of the fields.
+FLOWS = {
+    "high temperature": (30.0, ((0.0, 0.06), (6.0, 10.0), (0.0, 14.0))),
+    "mid-temperature": (15.0, ((0.0, 0.15), (2.0, 4.0), (0.0, 10.0))),
+    "low temperature": (6.0, ((0.0, 0.4), (0.0, 1.0), (0.0, 5.0))),
+}
+LINES = {
+    "lun": (style.Stroke(style.BLUE, style.SOLID), "modified Fourier"),
+    "lun-fourier": (style.Stroke(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Figure15:
+    """Flows and profiles by temperature and closure."""
+
+    flows: dict[tuple[str, str], Flow]
+    profiles: dict[tuple[str, str], Profile]
+
+    def table(self) -> Table:
+        """The profiles, one below the other."""
+        notes = [
+            f"{name}, {closure}: T_inf = {flow.surface_temperature}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}"
+            for (name, closure), flow in self.flows.items()
+        ]
+        columns = stacked(
+            "flow",
+            {
+                key: {field: getattr(profile, field) for field in ("height", *FIELDS)}
+                for key, profile in self.profiles.items()
+            },
+        )
+        keys = columns.pop("flow")
+        named = {"flow": [name for name, _ in keys], "closure": [closure for _, closure in keys]}
+        title = f"Figure 15: profiles of the flows with mass flux {MASS_FLUX}, forms of the heat flux compared"
+        chutes = (chute_note(dissipative(SLOPE, closure=closure)) for closure in LINES)
+        return Table(title, (*chutes, *notes), named | columns)
+
+
+def compute() -> Figure15:
+    """The three flows of each closure."""
+    found = {
+        (name, closure): flow
+        for closure in LINES
+        for name, flow in zip(FLOWS, flows(dissipative(SLOPE, closure=closure), Q=MASS_FLUX), strict=True)
+    }
+    profiles = {key: flow.profile(np.linspace(0.0, FLOWS[key[0]][0], POINTS)) for key, flow in found.items()}
+    return Figure15(found, profiles)
+
+
+def draw(data: Figure15) -> Figure:
+    """A row of three panels for each flow, from hot to cold."""
+    figure, axes = style.panels(3, 3, height=6.6, shared_y=True)
+    for row, (name, (top, ends)) in enumerate(FLOWS.items()):
+        for column, field in enumerate(FIELDS):
+            ax = axes[3 * row + column]
+            for closure, (stroke, words) in LINES.items():
+                profile = data.profiles[name, closure]
+                ax.plot(getattr(profile, field), profile.height, label=words, **stroke.line())
+            style.name_axes(
+                ax, style.label(field) if row == 2 else None, style.label("height") if column == 0 else None
+            )
+            ax.set_xlim(*ends[column])
+            ax.set_ylim(0.0, top)
+        style.write(axes[3 * row], ends[0][1], top, name, ha="right", va="top")
+    style.legend(axes[0], loc="upper right", bbox_to_anchor=(1.0, 0.92))
+    return figure

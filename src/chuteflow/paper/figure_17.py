@@ -1,0 +1,37 @@
+"""Figure 17: centre of mass against mass flux with either heat flux."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chuteflow.paper import style
+from chuteflow.paper.curves import Curves, draw_plain, frame, trace
+from chuteflow.paper.materials import dissipative
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SLOPE = 0.3
+#: Strokes and words of the two curves.
+LINES = {
+    "lun": (style.Stroke(style.BLUE, style.SOLID), "modified Fourier"),
+    "lun-fourier": (style.Stroke(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
+}
+#: Where the panel ends in Q and h.
+RIGHT, TOP = 6.0, 15.0
+
+
+def compute() -> Curves:
+    """The two curves."""
+    title = "Figure 17: centre of mass against mass flux, forms of the heat flux compared"
+    return trace(title, "closure", [dissipative(SLOPE, closure=closure) for closure in LINES])
+
+
+def draw(data: Curves) -> Figure:
+    """One panel."""
+    figure, (ax,) = style.panels(1, width=3.8, height=3.2)
+    for name, found in data.curves.items():
+        draw_plain(ax, found, *LINES[name])
+    frame(ax, RIGHT, TOP)
+    style.legend(ax, loc="center right")
+    return figure

@@ -1,0 +1,55 @@
+"""The figures of the paper that can be drawn: a new one is one module here, and one row in the table.
+
+A module has ``compute()``, which gives the data of the figure through the public interface of the package alone,
+and ``draw(data)``, which makes a matplotlib figure of it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.paper.data import FigureData
+
+#: Numbers and titles.
+FIGURES = {
+    1: "The coordinates",
+    2: "Profiles of the three flows at mass flux 3",
+    3: "Centre of mass, mass hold-up and mass flux along the family of flows",
+    4: "Centre of mass against mass flux over slopes",
+    5: "Profiles of a productive flow",
+    6: "Centre of mass against mass flux of productive flows",
+    7: "Volume fraction with either surface condition",
+    8: "Centre of mass against mass flux with either surface condition",
+    9: "Centre of mass against mass flux over slopes, interface conditions",
+    10: "Centre of mass against mass flux of hot flows, logarithmic",
+    11: "Parameters of hot flows against slope",
+    12: "Expansion of a hot flow against the full equations",
+    13: "Reduced system at lambda = 1 against the full equations",
+    14: "Where flows exist, in the plane of slope and roughness",
+    15: "Profiles with either heat flux",
+    16: "Parts of the heat flux",
+    17: "Centre of mass against mass flux with either heat flux",
+}
+
+
+class FigureModule(Protocol):
+    """What a module of a figure offers."""
+
+    def compute(self) -> FigureData:
+        """The data."""
+        ...
+
+    def draw(self, data: Any) -> Figure:
+        """The picture of the data."""
+        ...
+
+
+def figure(number: int) -> FigureModule:
+    """The module of figure ``number``, a key of FIGURES."""
+    if number not in FIGURES:
+        raise KeyError(number)
+    return cast("FigureModule", import_module(f"chuteflow.paper.figure_{number:02d}"))

@@ -1,0 +1,91 @@
+"""A chute: the four parameters, the surface condition and the constitutive law."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from chuteflow.errors import InputError
+from chuteflow.theory.boundary import ROUGHNESS_RANGE
+from chuteflow.theory.constitutive import require_positive
+from chuteflow.theory.laws import law
+
+#: Surface conditions: the half-line (2.16), or the interface of Jenkins & Hanes (3.31)-(3.32).
+SURFACES = ("free", "interface")
+
+
+@dataclass(frozen=True)
+class Chute:
+    """A planar chute and the grains on it.
+
+    Args:
+        slope: tan(theta) > 0.
+        restitution: e of two grains, 0 < e <= 1.
+        wall_restitution: e_w of a grain and the base, 0 <= e_w <= 1.
+        roughness: r of (2.8), 1/2 <= r <= sqrt(3)/2.
+        surface: "free" or "interface".
+        closure: name of a constitutive law, see :data:`chuteflow.theory.laws.LAWS`.
+
+    Raises:
+        InputError: for a value out of range, naming it, what was given and what is allowed.
+    """
+
+    slope: float
+    restitution: float
+    wall_restitution: float
+    roughness: float
+    surface: str = "free"
+    closure: str = "lun"
+
+    def __post_init__(self) -> None:
+        for name in ("slope", "restitution", "wall_restitution", "roughness"):
+            object.__setattr__(self, name, _number(name, getattr(self, name)))
+        if not 1e-8 <= self.slope <= 1e4:
+            raise InputError(f"slope = {self.slope}: tan(theta) must be positive (from 1e-8 to 1e4)")
+        if not 1e-8 <= self.restitution <= 1.0:
+            raise InputError(f"restitution e = {self.restitution}: must be above 0 (from 1e-8) and at most 1")
+        if not 0.0 <= self.wall_restitution <= 1.0:
+            raise InputError(f"wall restitution e_w = {self.wall_restitution}: must be from 0 to 1")
+        low, high = ROUGHNESS_RANGE
+        # sqrt(3)/2 typed with a few digits rounds up: give its last printed digits room.
+        if not low <= self.roughness <= high + 5e-5:
+            raise InputError(
+                f"roughness r = {self.roughness}: must be from 1/2 to sqrt(3)/2 = {high:.6f}, "
+                "where wall grains as large as the flowing ones leave no flat base to touch"
+            )
+        object.__setattr__(self, "roughness", min(self.roughness, high))
+        if self.surface not in SURFACES:
+            raise InputError(f"unknown surface {self.surface!r}: choose one of {', '.join(SURFACES)}")
+        require_positive(law(self.closure), self.restitution, self.slope)
+
+    @classmethod
+    def at_angle(cls, degrees: float, **others: Any) -> Chute:
+        """A chute inclined by ``degrees``, 0 < degrees < 90; the other arguments as for Chute.
+
+        Raises:
+            InputError: for an angle out of range.
+        """
+        angle = _number("angle", degrees)
+        if not 0.0 < angle < 90.0:
+            raise InputError(f"angle = {angle} degrees: must be above 0 and below 90")
+        return cls(slope=math.tan(math.radians(angle)), **others)
+
+    @property
+    def angle(self) -> float:
+        """Inclination theta in degrees."""
+        return math.degrees(math.atan(self.slope))
+
+    def as_dict(self) -> dict[str, float | str]:
+        """All parameters by name."""
+        return asdict(self)
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        number = float(value)  # pyright: ignore[reportArgumentType]
+    except (TypeError, ValueError):
+        raise InputError(f"{name} = {value!r}: must be a number") from None
+    if not math.isfinite(number):
+        raise InputError(f"{name} = {number}: must be a finite number")
+    return number

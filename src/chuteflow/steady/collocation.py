@@ -1,0 +1,212 @@
+"""The discretised steady problem: Chebyshev collocation in the overburden coordinate, exact Jacobian.
+
+# notation: s grid coordinate, m = P/M share of the overburden, theta heat potential, g = dtheta/dm,
+# otherwise as in chuteflow.steady.model.
+
+The unknown field is g at the nodes of a grid on 0 <= s <= 1; with it go theta at the surface and ln M.
+Taking the gradient for the unknown, and the potential as its integral, keeps all digits of the heat flux in
+cold and thin flows, where theta is almost uniform. The overburden is P = M m(s), with
+m = expm1(alpha s)/expm1(alpha): alpha = 0 is the plain coordinate, and a larger stretch alpha spreads the
+thin dilute layer of a cold flow over the grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from chuteflow.numerics.chebyshev import Array, Grid, grid, interpolation_matrix, refinement
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+
+#: The order of the macroscopic quantities: ln Q, ln h, ln M, ln T_surface.
+LOG_Q, LOG_H, LOG_M, LOG_T = range(4)
+#: The least stretch: plain to rounding, and in need of no other formula.
+_PLAIN = 1e-9
+
+
+def stretch_map(s: Array, stretch: Array | float) -> tuple[Array, Array]:
+    """m(s) and dm/ds for a stretch alpha >= 0, or for many in the shape (..., 1)."""
+    alpha = np.maximum(stretch, _PLAIN)
+    whole = np.expm1(alpha)
+    return np.expm1(alpha * s) / whole, alpha * np.exp(alpha * s) / whole
+
+
+def stretch_position(m: Array, stretch: Array | float) -> Array:
+    """s at shares m: the inverse of :func:`stretch_map`."""
+    alpha = np.maximum(stretch, _PLAIN)
+    return np.log1p(m * np.expm1(alpha)) / alpha
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """The problem of ``model`` on the grid of one ``degree`` n, with one ``stretch``.
+
+    Unknowns z (n+3,) = (g at the nodes, theta at the surface, ln M); residuals (n+2,): the surface condition,
+    the energy balance at the other nodes, and the base condition. Many flows are treated at once with
+    unknowns (k, n+3) and, where their stretches differ, a ``stretch`` of the shape (k, 1).
+    """
+
+    model: Model
+    degree: int
+    stretch: Array | float
+
+    @property
+    def grid(self) -> Grid:
+        """The grid in s."""
+        return grid(self.degree)
+
+    @cached_property
+    def share(self) -> tuple[Array, Array]:
+        """m and dm/ds at the nodes."""
+        return stretch_map(self.grid.nodes, self.stretch)
+
+    @cached_property
+    def accumulate(self) -> Array:
+        """Matrix (n+1, n+1) that takes g to theta less its surface value."""
+        return self.grid.integral * self.share[1][..., None, :]
+
+    def state(self, z: Array) -> State:
+        """Everything pointwise at unknowns ``z``."""
+        return State(self, z)
+
+    def transferred(self, degree: int, stretch: Array | float | None = None) -> tuple[Collocation, Array]:
+        """The problem on another grid, and the matrix that takes g to its nodes."""
+        if stretch is None or stretch is self.stretch or np.array_equal(stretch, self.stretch):
+            return Collocation(self.model, degree, self.stretch), refinement(self.degree, degree)
+        other = Collocation(self.model, degree, stretch)
+        position = stretch_position(other.share[0], self.stretch)
+        return other, interpolation_matrix(self.grid, position)
+
+
+class State:
+    """Pointwise fields of discretised flows, residuals, integrals and exact derivatives."""
+
+    def __init__(self, problem: Collocation, z: Array) -> None:
+        self.problem = problem
+        model = problem.model
+        self.g = z[..., :-2]
+        self.mass = mass = np.exp(z[..., -1:])
+        m, dm = problem.share
+        self.theta = z[..., -2:-1] + (problem.accumulate @ self.g[..., None])[..., 0]
+        self.overburden = mass * m
+        self.p = p = self.overburden + model.surface_stress
+        #: P/p, which is 1 on the half-line
+        self.laden = self.overburden / p if model.surface_stress else np.ones_like(p)
+        self.x = p * np.exp(-self.theta)
+        self.f, self.df = f, _ = model.closures(self.x)
+        self.y = f[CONDUCTION] * self.g / mass
+        self.s_p = 1.0 / (mass * dm)  # ds/dp
+        self.y_p = (self.y @ problem.grid.derivative.T) * self.s_p
+        self.rise = p * self.g / mass  # p dtheta/dp
+        self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
+        self.net_loss = f[LOSS] - model.slope**2 * f[WORK]
+        self.log_t = self.theta + f[GAMMA]
+
+    def residual(self) -> Array:
+        """Surface condition, energy balance at the nodes below it, base condition, (n+2,)."""
+        model = self.problem.model
+        r = np.empty((*self.p.shape[:-1], self.p.shape[-1] + 1))
+        r[..., :-1] = self.p * (self.y_p - self.net_loss) + self.y * (1.0 + 0.5 * self.heating)
+        r[..., 0] = self.y[..., 0] - model.surface_flux
+        r[..., -1] = self.y[..., -1] - model.base_flux(self.f[..., -1])
+        return r
+
+    def jacobian(self) -> Array:
+        """Derivative (n+2, n+3) of the residual with respect to z."""
+        problem, model = self.problem, self.problem.model
+        f, df, p, y, laden = self.f, self.df, self.p, self.y, self.laden
+        n = p.shape[-1]
+        nodes = np.arange(n)
+        y_log_x = df[CONDUCTION] * self.g / self.mass
+        # Columns: g through the potential, then directly; theta at the surface; ln M.
+        # ln x falls by the rise of theta, and rises by P/p with ln M.
+        y_z = np.empty((*p.shape, n + 2))
+        np.multiply(-y_log_x[..., None], problem.accumulate, out=y_z[..., :n])
+        y_z[..., nodes, nodes] += f[CONDUCTION] / self.mass
+        y_z[..., n] = -y_log_x
+        y_z[..., n + 1] = y_log_x * laden - y
+        heating_log_x = df[COUPLING] * (1.0 - self.rise)
+        by_log_x = 0.5 * y * heating_log_x - p * (df[LOSS] - model.slope**2 * df[WORK])
+        by_rise = 0.5 * y * (1.0 - f[COUPLING])
+        out = np.empty((*p.shape[:-1], n + 1, n + 2))
+        body = out[..., :-1, :]
+        np.matmul((p * self.s_p)[..., None] * problem.grid.derivative, y_z, out=body)
+        body += (1.0 + 0.5 * self.heating)[..., None] * y_z
+        body[..., :n] -= by_log_x[..., None] * problem.accumulate
+        body[..., nodes, nodes] += by_rise * p / self.mass
+        body[..., n] -= by_log_x
+        body[..., n + 1] += (
+            (self.overburden - p) * self.y_p
+            - self.overburden * self.net_loss
+            + by_log_x * laden
+            + by_rise * (laden - 1.0) * self.rise
+        )
+        out[..., 0, :] = y_z[..., 0, :]
+        base = model.slope * model.slip_slope(df[..., -1])
+        out[..., -1, :] = y_z[..., -1, :]
+        out[..., -1, :n] += base[..., None] * problem.accumulate[..., -1, :]
+        out[..., -1, n] += base
+        out[..., -1, n + 1] -= base * laden[..., -1]
+        return out
+
+    def macroscopic(self) -> Array:
+        """ln Q, ln h, ln M and ln T_surface, (4,): (3.26) and (3.27) as integrals over the overburden."""
+        mass = self.mass[..., 0]
+        flux, moment = self._slip + self._glide.sum(axis=-1), self._heights.sum(axis=-1)
+        return np.stack([np.log(flux), np.log(moment / mass), np.log(mass), self.log_t[..., 0]], axis=-1)
+
+    @cached_property
+    def _heights(self) -> Array:
+        """Contributions of the nodes to the integral of P dz = (P/nu) dp."""
+        lever = self.laden * np.exp(self.theta - self.f[DENSITY])
+        return self.problem.grid.weights * self.problem.share[1] * self.mass * lever
+
+    @cached_property
+    def _glide_per_work(self) -> Array:
+        weights = self.problem.grid.weights * self.problem.share[1] * self.mass
+        return weights * self.overburden * (self.problem.model.slope * np.exp(0.5 * self.log_t))
+
+    @cached_property
+    def _glide(self) -> Array:
+        """Contributions to the integral of P du, with du = s (g1/g2) sqrt(T) dp/nu (3.10)."""
+        return self._glide_per_work * self.f[WORK]
+
+    @cached_property
+    def _slip(self) -> Array:
+        """Flux carried by the slip velocity (3.15)."""
+        slip = self.problem.model.slip(self.f[..., -1])
+        return slip * np.exp(0.5 * self.log_t[..., -1]) * self.mass[..., 0]
+
+    def macroscopic_gradient(self) -> Array:
+        """Derivative (4, n+3) of :meth:`macroscopic` with respect to z."""
+        model, df, laden = self.problem.model, self.df, self.laden
+        n = self.p.shape[-1]
+        root_t = 0.5 * (1.0 - df[GAMMA])  # d ln sqrt(T) / dtheta
+        heights, glide = self._heights, self._glide
+        work_part = self._glide_per_work * df[WORK]
+        flux = self._slip + glide.sum(axis=-1)
+        moment = heights.sum(axis=-1)
+        slip_log_x = model.slip_slope(df[..., -1]) / model.slip(self.f[..., -1])
+        end = self._slip / flux
+        by_theta = np.empty((*self.p.shape[:-1], 2, n))
+        by_theta[..., 0, :] = (glide * root_t - work_part) / flux[..., None]
+        by_theta[..., 0, -1] += end * (root_t[..., -1] - slip_log_x)
+        by_theta[..., 1, :] = heights * (1.0 + df[DENSITY]) / moment[..., None]
+        out = np.zeros((*self.p.shape[:-1], 4, n + 2))
+        out[..., :2, :n] = by_theta @ self.problem.accumulate
+        out[..., :2, n] = by_theta.sum(axis=-1)
+        glide_move = (glide * (2.0 + 0.5 * df[GAMMA] * laden) + work_part * laden).sum(axis=-1)
+        slip_move = 1.0 + (slip_log_x + 0.5 * df[GAMMA][..., -1]) * laden[..., -1]
+        out[..., LOG_Q, n + 1] = glide_move / flux + end * slip_move
+        height_move = (heights * (2.0 - laden * (1.0 + df[DENSITY]))).sum(axis=-1)
+        out[..., LOG_H, n + 1] = height_move / moment - 1.0
+        out[..., LOG_M, n + 1] = 1.0
+        out[..., LOG_T, n] = self.log_t_slope
+        return out
+
+    @property
+    def log_t_slope(self) -> Array:
+        """d ln T_surface / dtheta at the surface."""
+        return 1.0 - self.df[GAMMA][..., 0]

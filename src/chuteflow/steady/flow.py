@@ -1,0 +1,293 @@
+"""A steady flow: its numbers, its kind, and its fields as smooth functions of height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+from chuteflow.steady.solver import Solution
+
+#: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
+CUTOFF = 0.01
+#: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
+_SAMPLES = 96
+#: Share P/M of the overburden above the highest point that is told from the far field.
+_SMALLEST_SHARE = 1e-260
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS."""
+
+    height: Array
+    volume_fraction: Array
+    granular_temperature: Array
+    velocity: Array
+    heat_flux: Array
+    conductive_heat_flux: Array
+    density_heat_flux: Array
+    normal_stress: Array
+    shear_stress: Array
+    shear_rate: Array
+    production: Array
+    dissipation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A steady, fully developed flow on ``chute``.
+
+    All numbers are dimensionless (lengths in grain diameters d, velocities in sqrt(g d cos theta),
+    temperatures in g d cos theta, stresses in rho_p g d cos theta). ``error`` is the estimated relative
+    error, the largest of mass flux, centre of mass and hold-up.
+    """
+
+    chute: Chute
+    solution: Solution
+
+    @property
+    def mass_flux(self) -> float:
+        """Q, (3.26)."""
+        return self._macroscopic(LOG_Q)
+
+    @property
+    def centre_of_mass(self) -> float:
+        """h, (3.27)."""
+        return self._macroscopic(LOG_H)
+
+    @property
+    def mass_holdup(self) -> float:
+        """M, (3.27)."""
+        return self._macroscopic(LOG_M)
+
+    @property
+    def surface_temperature(self) -> float:
+        """T far above (half-line) or at the interface."""
+        return self._macroscopic(LOG_T)
+
+    @property
+    def error(self) -> float:
+        """Estimated relative error of Q, h and M, the largest."""
+        return self.solution.error
+
+    @property
+    def base_temperature(self) -> float:
+        """T at the base."""
+        return float(np.exp(self._state.log_t[-1]))
+
+    @property
+    def base_volume_fraction(self) -> float:
+        """nu at the base."""
+        return float(self._density(self._state.x, self._state.f)[-1])
+
+    @property
+    def slip_velocity(self) -> float:
+        """u at the base, (3.15)."""
+        state = self._state
+        return float(self._model.slip(state.f[:, -1]) * np.exp(0.5 * state.log_t[-1]))
+
+    @cached_property
+    def largest_volume_fraction(self) -> float:
+        """The largest nu in the flow."""
+        return float(self._at_share(self._share_of_largest)[0]["nu"][0])
+
+    @property
+    def interface_height(self) -> float:
+        """H, the height of the interface; infinite on the half-line (section 3.7)."""
+        if self._model.surface_stress == 0.0:
+            return float("inf")
+        return float(self._heights(np.zeros(1))[0])
+
+    @cached_property
+    def depth(self) -> float:
+        """Height above which nu is below 1 % of its maximum, or of the interface where it stays above."""
+        target = np.log(CUTOFF * self.largest_volume_fraction)
+        if self._model.surface_stress and self._log_density(0.0) >= target:
+            return self.interface_height
+        low, high = np.log(_SMALLEST_SHARE), np.log(self._share_of_largest[0])
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if self._log_density(np.exp(middle)) < target:
+                low = middle
+            else:
+                high = middle
+        return float(self._heights(np.array([np.exp(0.5 * (low + high))]))[0])
+
+    @cached_property
+    def interior(self) -> str:
+        """ "dissipative" or "productive" throughout, or "mixed"."""
+        net = self._samples["net"]
+        # Net loss within rounding of zero decides nothing.
+        scale = 1e-12 * np.abs(net).max()
+        if net.min() >= -scale:
+            return "dissipative"
+        return "productive" if net.max() <= scale else "mixed"
+
+    @property
+    def density(self) -> str:
+        """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
+        return "inverted" if self.density_excess > 0.0 else "monotonic"
+
+    @cached_property
+    def density_excess(self) -> float:
+        """Largest d ln nu/d ln p below zero, as p dtheta/dp - 1: positive where the density is inverted."""
+        return float(self._samples["rise"].max() - 1.0)
+
+    @cached_property
+    def net_loss_range(self) -> tuple[float, float]:
+        """Smallest and largest dissipation less production over nu p sqrt(T) in the flow."""
+        net = self._samples["net"]
+        return float(net.min()), float(net.max())
+
+    def profile(self, z: ArrayLike) -> Profile:
+        """All fields at heights ``z`` >= 0 (array), in any order; above an interface they are not defined.
+
+        Raises:
+            InputError: for a height below the base or above the interface.
+        """
+        z = np.asarray(z, dtype=float)
+        flat = z.ravel()
+        highest = self.interface_height
+        if flat.size and not (np.isfinite(flat).all() and flat.min() >= 0.0 and flat.max() <= highest * (1 + 1e-12)):
+            raise InputError(f"heights must be from 0 (base) to {highest}: got {flat.min()} to {flat.max()}")
+        fields = self._fields(self._shares_at(flat))
+        return Profile(height=z.copy(), **{name: values.reshape(z.shape) for name, values in fields.items()})
+
+    def sampled(self, points: int = 201, top: float | None = None) -> Profile:
+        """All fields at ``points`` heights, spaced evenly from the base to ``top``, by default the depth."""
+        return self.profile(np.linspace(0.0, self.depth if top is None else top, points))
+
+    @property
+    def _model(self) -> Model:
+        return self.solution.problem.model
+
+    @cached_property
+    def _state(self) -> State:
+        return self.solution.problem.state(self.solution.z)
+
+    def _macroscopic(self, which: int) -> float:
+        return float(np.exp(self.solution.macroscopic[which]))
+
+    def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
+        """Potential, gradient, closures and density at shares m = P/M of the overburden."""
+        problem, state = self.solution.problem, self._state
+        s = stretch_position(share, problem.stretch)
+        matrix = interpolation_matrix(problem.grid, s)
+        g = matrix @ state.g
+        theta = matrix @ state.theta
+        p = state.mass * share + self._model.surface_stress
+        x = p * np.exp(-theta)
+        f, _ = self._model.closures(x)
+        rise = p * g / state.mass
+        fields = {
+            "p": p,
+            "nu": self._density(x, f),
+            "y": f[CONDUCTION] * g / state.mass,
+            "rise": rise,
+            "log_t": theta + f[GAMMA],
+        }
+        return fields, f
+
+    @staticmethod
+    def _density(x: Array, f: Array) -> Array:
+        return x * np.exp(f[DENSITY])
+
+    def _log_density(self, share: float) -> float:
+        return float(np.log(self._at_share(np.array([share]))[0]["nu"][0]))
+
+    @cached_property
+    def _samples(self) -> dict[str, Array]:
+        """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid."""
+        problem, state = self.solution.problem, self._state
+        degree = max(_SAMPLES, 2 * problem.degree)
+        nodal = np.stack([self._density(state.x, state.f), state.rise, state.net_loss])
+        nu, rise, net = nodal @ refinement(problem.degree, degree).T
+        share, _ = stretch_map(grid(degree).nodes, problem.stretch)
+        return {"share": share, "nu": nu, "rise": rise, "net": net}
+
+    @cached_property
+    def _share_of_largest(self) -> Array:
+        """Share of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
+        share, nu = self._samples["share"], self._samples["nu"]
+        k = int(np.argmax(nu))
+        if k in (0, len(nu) - 1):
+            return share[k : k + 1]
+        low, high = share[k - 1], share[k + 1]
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            if self._at_share(np.array([middle]))[0]["rise"][0] < 1.0:
+                low = middle
+            else:
+                high = middle
+        return np.array([0.5 * (low + high)])
+
+    @cached_property
+    def _antiderivatives(self) -> tuple[Array, Array]:
+        """At the nodes, integrals over the overburden from the base up: the regular part of z, and u."""
+        problem, state = self.solution.problem, self._state
+        g = problem.grid
+        span = 1.0 / state.s_p  # dp/ds
+        per_fall = np.exp(state.theta - state.f[DENSITY])  # dz/d ln p, which is T_surface at p = 0
+        if self._model.surface_stress == 0.0:
+            regular = np.empty_like(span)
+            regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
+            regular[0] = g.derivative[0] @ per_fall
+        else:
+            regular = per_fall / state.p * span
+        glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
+        height = g.integral @ regular
+        velocity = g.integral @ glide
+        return height[-1] - height, self.slip_velocity + velocity[-1] - velocity
+
+    def _heights(self, share: Array) -> Array:
+        s = stretch_position(share, self.solution.problem.stretch)
+        z = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[0]
+        if self._model.surface_stress == 0.0:
+            z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
+        return z
+
+    def _shares_at(self, z: Array) -> Array:
+        """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
+        state, p_s = self._state, self._model.surface_stress
+        knots = self._samples["share"].copy()
+        if p_s == 0.0:
+            knots[0] = _SMALLEST_SHARE
+        log_p = np.interp(z, self._heights(knots)[::-1], np.log(state.mass * knots + p_s)[::-1])
+        low, high = np.log(state.mass * knots[0] + p_s), np.log(state.mass + p_s)
+        for _ in range(60):
+            share = np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
+            fields, _ = self._at_share(share)
+            pace = np.exp(log_p) / fields["nu"]
+            move = np.clip((self._heights(share) - z) / pace, -50.0, 50.0)
+            log_p = np.clip(log_p + move, low, high)
+            if np.abs(move).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(log_p).max(initial=0.0))):
+                break
+        return np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
+
+    def _fields(self, share: Array) -> dict[str, Array]:
+        at, f = self._at_share(share)
+        slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
+        root_t = np.exp(0.5 * at["log_t"])
+        s = stretch_position(share, self.solution.problem.stretch)
+        conducting = f[CONDUCTION] * root_t
+        return {
+            "volume_fraction": nu,
+            "granular_temperature": root_t**2,
+            "velocity": interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1],
+            "heat_flux": at["y"] * p * root_t,
+            "conductive_heat_flux": conducting * (rise + f[COUPLING] * (1.0 - rise)),
+            "density_heat_flux": -conducting * f[COUPLING] * (1.0 - rise),
+            "normal_stress": p,
+            "shear_stress": -slope * p,
+            "shear_rate": slope * f[WORK] * nu * root_t,
+            "production": slope**2 * f[WORK] * nu * p * root_t,
+            "dissipation": f[LOSS] * nu * p * root_t,
+        }

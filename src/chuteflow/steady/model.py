@@ -1,0 +1,155 @@
+"""The continuous steady problem in the overburden coordinate, with the closures tabulated.
+
+# notation: p normal stress (the coordinate), P = p - p_S overburden, M hold-up, nu volume fraction,
+# theta = ln T - Gamma(nu) heat potential, x = p exp(-theta) = g1 exp(Gamma), which is nu where dilute,
+# y = q/(p sqrt(T)) heat flux, s slope.
+
+At a given p, the potential theta fixes the density through x, which rises with nu. With ' = d/dp the problem
+on p_S <= p <= p_S + M is
+
+    y = a theta',    p T'/T = p theta' + k (1 - p theta'),    k = (g4/g3) dnu/dln x
+    p y' + y + y (p T'/T)/2 = p (loss - s^2 work)    (3.9)
+    y = y_S at p_S,    y = base(nu) at p_S + M       (3.17), (3.18) with F2 = g1 base
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
+from chuteflow.steady.chute import Chute
+from chuteflow.theory import boundary
+from chuteflow.theory.constitutive import Law, reduce
+from chuteflow.theory.laws import law
+
+#: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
+#: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
+CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
+
+# Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
+_OFFSET = 0.2
+_UPPER, _PIECES, _DEGREE = 4.2, 200, 7
+
+
+def _coordinate(x: Array) -> Array:
+    return np.log1p(np.log1p(x * (1.0 / _OFFSET)))
+
+
+def _coordinate_slope(x: Array) -> Array:
+    """dc/dln x."""
+    return x / ((x + _OFFSET) * (1.0 + np.log1p(x * (1.0 / _OFFSET))))
+
+
+def _argument(c: Array) -> Array:
+    return _OFFSET * np.expm1(np.expm1(c))
+
+
+def closure_table(closure: str, e: float, slope: float) -> Table:
+    """The eight functions of x for ``closure``."""
+    return _closure_table(closure, e, slope if law(closure).knows_slope else 0.0)
+
+
+@lru_cache(maxsize=32)
+def _closure_table(closure: str, e: float, slope: float) -> Table:
+    chosen = law(closure)
+    density = _density_table(chosen, e, slope)
+
+    def functions(c: Array) -> Array:
+        x = _argument(c)
+        ratio = _invert(density, x)  # of room-scaled density to x
+        scaled = x * np.exp(ratio)
+        r = reduce(chosen, scaled, e, slope)
+        room = 1.0 / (1.0 + scaled / chosen.densest)
+        nu = scaled * room
+        (_, gamma), _ = density(_coordinate(scaled))
+        k = r.coupling * nu / (r.stiffness + r.coupling * nu)
+        return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
+
+    return tabulate(functions, 0.0, _UPPER, _PIECES, _DEGREE)
+
+
+def _density_table(chosen: Law, e: float, slope: float) -> Table:
+    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*)."""
+
+    def gamma_slope(c: Array) -> Array:
+        scaled = _argument(c)
+        room = 1.0 / (1.0 + scaled / chosen.densest)
+        rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
+        return rate[:, None] * ((scaled + _OFFSET) * (1.0 + np.log1p(scaled / _OFFSET)))[:, None]
+
+    gamma = antiderivative(tabulate(gamma_slope, 0.0, _UPPER, _PIECES, _DEGREE))
+
+    def functions(c: Array) -> Array:
+        scaled = _argument(c)
+        room = 1.0 / (1.0 + scaled / chosen.densest)
+        (big_gamma,), _ = gamma(c)
+        log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
+        return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
+
+    return tabulate(functions, 0.0, _UPPER, _PIECES, _DEGREE)
+
+
+def _invert(density: Table, x: Array) -> Array:
+    """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
+    log_x = np.log(np.maximum(x, 1e-300))
+    knots = _argument(np.linspace(1e-9, _UPPER, 400))
+    (log_ratio, _), _ = density(_coordinate(knots))
+    log_scaled = np.interp(log_x, np.log(knots) + log_ratio, np.log(knots))
+    log_scaled = np.where(x < 1e-8, log_x, log_scaled)
+    for _ in range(4):
+        scaled = np.exp(log_scaled)
+        values, slopes = density(_coordinate(scaled))
+        log_scaled = log_scaled - (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * _coordinate_slope(scaled))
+    return log_scaled - log_x
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The steady problem of one chute: closures and boundary data, ready to evaluate."""
+
+    chute: Chute
+    table: Table
+    surface_stress: float
+    surface_flux: float
+    base_loss: float
+    slip_of_empty_base: float
+
+    @property
+    def slope(self) -> float:
+        """tan(theta)."""
+        return self.chute.slope
+
+    def closures(self, x: Array) -> tuple[Array, Array]:
+        """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
+        inner = np.log1p(x * (1.0 / _OFFSET))
+        values, slopes = self.table(np.log1p(inner))
+        return values, slopes * (x / ((x + _OFFSET) * (1.0 + inner)))
+
+    def slip(self, closures: Array) -> Array:
+        """F1 of (3.16)."""
+        chute = self.chute
+        return boundary.slip_coefficient(closures[SHEAR], closures[GRIP], chute.roughness, chute.slope)
+
+    def slip_slope(self, slopes: Array) -> Array:
+        """Derivative of F1, given those of the closures: F1 is affine in them."""
+        return self.slip(slopes) - self.slip_of_empty_base
+
+    def base_flux(self, closures: Array) -> Array:
+        """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
+        return self.slope * self.slip(closures) - self.base_loss
+
+
+@lru_cache(maxsize=256)
+def model(chute: Chute) -> Model:
+    """The continuous problem of ``chute``."""
+    return Model(
+        chute=chute,
+        table=closure_table(chute.closure, chute.restitution, chute.slope),
+        surface_stress=boundary.surface_stress(chute.surface),
+        surface_flux=boundary.surface_flux(chute.surface, chute.slope),
+        base_loss=boundary.base_loss(chute.wall_restitution, chute.roughness),
+        slip_of_empty_base=float(boundary.slip_coefficient(np.zeros(()), np.zeros(()), chute.roughness, chute.slope)),
+    )

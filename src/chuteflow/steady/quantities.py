@@ -1,0 +1,179 @@
+"""The registry of quantities: one row each, from which plots, files, command line and documents are fed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from chuteflow.errors import InputError
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a flow.
+
+    ``name`` is the attribute of :class:`chuteflow.Flow` (or of its profile); ``symbol`` and ``latex`` its
+    notation; ``dimension`` the exponents of grain density, grain diameter and acceleration g cos(theta) in
+    its scale; ``unit`` the SI unit; ``equation`` where the paper defines it.
+    """
+
+    name: str
+    symbol: str
+    latex: str
+    dimension: tuple[float, float, float]
+    unit: str
+    equation: str
+    description: str
+
+
+#: Fields over height, attributes of a profile.
+FIELDS: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        Quantity("height", "z", "z", (0, 1, 0), "m", "section 3.1", "height above the base"),
+        Quantity("volume_fraction", "nu", r"\nu", (0, 0, 0), "1", "(2.7)", "volume fraction of grains"),
+        Quantity("granular_temperature", "T", "T", (0, 1, 1), "m^2/s^2", "section 2.1", "granular temperature"),
+        Quantity("velocity", "u", "u", (0, 0.5, 0.5), "m/s", "(3.10)", "velocity down the slope"),
+        Quantity("heat_flux", "q", "q", (1, 1.5, 1.5), "W/m^2", "(3.6)", "flux of fluctuation energy upwards"),
+        Quantity(
+            "conductive_heat_flux",
+            "q_T",
+            "q_T",
+            (1, 1.5, 1.5),
+            "W/m^2",
+            "(3.6)",
+            "part of the heat flux along the temperature gradient",
+        ),
+        Quantity(
+            "density_heat_flux",
+            "q_nu",
+            r"q_\nu",
+            (1, 1.5, 1.5),
+            "W/m^2",
+            "(3.6)",
+            "part of the heat flux along the density gradient",
+        ),
+        Quantity("normal_stress", "P_zz", "P_{zz}", (1, 1, 1), "Pa", "(3.4)", "normal stress"),
+        Quantity("shear_stress", "P_xz", "P_{xz}", (1, 1, 1), "Pa", "(3.5)", "shear stress"),
+        Quantity("shear_rate", "du/dz", r"\mathrm{d}u/\mathrm{d}z", (0, -0.5, 0.5), "1/s", "(3.10)", "shear rate"),
+        Quantity(
+            "production",
+            "-P_xz du/dz",
+            r"-P_{xz}\,\mathrm{d}u/\mathrm{d}z",
+            (1, 0.5, 1.5),
+            "W/m^3",
+            "(3.3)",
+            "fluctuation energy produced by shear work",
+        ),
+        Quantity(
+            "dissipation",
+            "gamma",
+            r"\gamma",
+            (1, 0.5, 1.5),
+            "W/m^3",
+            "(3.7)",
+            "fluctuation energy lost in collisions",
+        ),
+    )
+}
+
+#: Numbers of a whole flow, attributes of a flow.
+NUMBERS: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        Quantity("mass_flux", "Q", "Q", (1, 1.5, 0.5), "kg/m/s", "(3.26)", "mass flux per unit width"),
+        Quantity("centre_of_mass", "h", "h", (0, 1, 0), "m", "(3.27)", "height of the centre of mass"),
+        Quantity("mass_holdup", "M", "M", (1, 1, 0), "kg/m^2", "(3.27)", "mass per unit area of the base"),
+        Quantity(
+            "surface_temperature",
+            "T_surface",
+            r"T_\infty",
+            (0, 1, 1),
+            "m^2/s^2",
+            "section 3.2",
+            "granular temperature far above, or at the interface",
+        ),
+        Quantity(
+            "base_temperature",
+            "T_base",
+            "T_0",
+            (0, 1, 1),
+            "m^2/s^2",
+            "section 3.1",
+            "granular temperature at the base",
+        ),
+        Quantity(
+            "base_volume_fraction",
+            "nu_base",
+            r"\nu_0",
+            (0, 0, 0),
+            "1",
+            "section 3.1",
+            "volume fraction at the base",
+        ),
+        Quantity(
+            "largest_volume_fraction",
+            "nu_max",
+            r"\nu_{\max}",
+            (0, 0, 0),
+            "1",
+            "section 3.5",
+            "largest volume fraction in the flow",
+        ),
+        Quantity("slip_velocity", "u_base", "u_0", (0, 0.5, 0.5), "m/s", "(3.15)", "velocity at the base"),
+        Quantity(
+            "depth",
+            "depth",
+            r"z_{1\%}",
+            (0, 1, 0),
+            "m",
+            "section 3.3",
+            "height above which the volume fraction is below 1 % of its maximum",
+        ),
+        Quantity(
+            "interface_height",
+            "H",
+            "H",
+            (0, 1, 0),
+            "m",
+            "section 3.7",
+            "height of the interface (infinite on the half-line)",
+        ),
+    )
+}
+
+QUANTITIES: dict[str, Quantity] = FIELDS | NUMBERS
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Grain diameter (m), grain density (kg/m^3) and gravity (m/s^2), with which results take SI units.
+
+    Lengths scale with the diameter d, time with sqrt(d/(g cos theta)), densities with that of a grain
+    (section 3.1).
+
+    Raises:
+        InputError: for a scale that is not positive.
+    """
+
+    diameter: float
+    density: float
+    gravity: float = 9.81
+
+    def __post_init__(self) -> None:
+        for name in ("diameter", "density", "gravity"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} = {value}: must be a positive number")
+
+    def factor(self, name: str, slope: float) -> float:
+        """What the dimensionless quantity ``name`` on a chute of ``slope`` is multiplied with for SI units.
+
+        Raises:
+            InputError: for an unknown quantity.
+        """
+        if name not in QUANTITIES:
+            raise InputError(f"unknown quantity {name!r}: choose one of {', '.join(QUANTITIES)}")
+        of_density, of_diameter, of_acceleration = QUANTITIES[name].dimension
+        acceleration = self.gravity / math.hypot(1.0, slope)
+        return self.density**of_density * self.diameter**of_diameter * acceleration**of_acceleration

@@ -1,0 +1,136 @@
+"""All flows of a chute: the paper's, hidden families, extreme values, and why there is none."""
+
+import numpy as np
+import pytest
+
+from chuteflow import Chute, InputError, curve, flows
+
+PAPER = Chute(0.3, 0.8, 0.8, 0.6)
+
+
+def test_the_three_flows_of_the_paper():
+    a, b, c = flows(PAPER, Q=3.0)
+    assert [round(f.surface_temperature, 2) for f in (a, b, c)] == [7.34, 2.54, 0.20]
+    assert c.surface_temperature == pytest.approx(0.197, abs=5e-4)
+    assert [round(f.centre_of_mass, 2) for f in (a, b, c)] == [8.84, 3.98, 1.77]
+    assert [round(f.mass_holdup, 2) for f in (a, b, c)] == [0.44, 0.59, 1.26]
+    assert [f.density for f in (a, b, c)] == ["monotonic", "monotonic", "inverted"]
+    assert {f.interior for f in (a, b, c)} == {"dissipative"}
+    for flow in (a, b, c):
+        assert flow.mass_flux == pytest.approx(3.0, rel=1e-12)
+        assert flow.error <= 1e-10
+
+
+@pytest.mark.parametrize(
+    ("chute", "count"), [(Chute(0.3, 0.9, 0.6, 0.8), 2), (Chute(0.36, 0.8, 0.8, 0.85), 2), (PAPER, 1)]
+)
+def test_flows_of_one_surface_temperature(chute, count):
+    found = flows(chute, T_surface=1.0)
+    assert len(found) == count
+    holdups = [f.mass_holdup for f in found]
+    assert holdups == sorted(holdups)
+    for flow in found:
+        assert flow.surface_temperature == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("surface", ["free", "interface"])
+@pytest.mark.parametrize("closure", ["lun", "lun-fourier"])
+def test_the_same_flow_by_each_quantity(surface, closure):
+    chute = Chute(0.3, 0.8, 0.8, 0.6, surface=surface, closure=closure)
+    for flow in flows(chute, Q=3.0):
+        for found in (
+            flows(chute, M=flow.mass_holdup),
+            flows(chute, h=flow.centre_of_mass),
+            flows(chute, T_surface=flow.surface_temperature),
+        ):
+            off = [abs(f.mass_flux / 3.0 - 1.0) for f in found]
+            assert min(off) < 1e-9
+
+
+def test_near_a_fold_there_are_two_flows_or_none():
+    (branch,) = curve(PAPER, surface_temperature=(0.01, 500.0)).branches
+    folds = [s.flow.mass_flux for s in branch.special if s.kind == "fold-Q"]
+    lower, upper = sorted(folds)
+    for apart in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9):
+        assert len(flows(PAPER, Q=lower * (1.0 + apart))) == 3
+        assert len(flows(PAPER, Q=lower * (1.0 - apart))) == 1
+        assert len(flows(PAPER, Q=upper * (1.0 - apart))) == 3
+        assert len(flows(PAPER, Q=upper * (1.0 + apart))) == 1
+
+
+def test_extreme_fluxes_extend_the_search():
+    (cold,) = flows(PAPER, Q=1e-6)
+    (hot,) = flows(PAPER, Q=1e6)
+    assert cold.mass_flux == pytest.approx(1e-6, rel=1e-10)
+    assert hot.mass_flux == pytest.approx(1e6, rel=1e-10)
+    assert flows(PAPER, Q=1e6).searched.surface_temperature[1] > hot.surface_temperature
+    # Q ~ sqrt(T): the hot branch continues the flow at a thousandth of the flux
+    less = flows(PAPER, Q=1e3)[0]
+    assert hot.surface_temperature / less.surface_temperature == pytest.approx(1e6, rel=1e-3)
+
+
+def test_deep_flows_beyond_the_dividing_trajectory():
+    found = flows(Chute(0.29, 0.9, 0.8, 0.7), M=29.0)
+    by_temperature = [f.surface_temperature for f in found]
+    assert len(found) >= 3
+    assert by_temperature == sorted(by_temperature, reverse=True)
+    for flow in found:
+        assert flow.mass_holdup == pytest.approx(29.0, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("chute", "condition", "reason"),
+    [
+        (Chute(0.2, 0.8, 0.8, 0.85), {"Q": 3.0}, "base and interior both lose energy at every density"),
+        (Chute(0.5, 0.8, 0.8, 0.5), {"Q": 3.0}, "base and interior both gain energy at every density"),
+        (Chute(0.41, 0.8, 0.8, 0.6), {"T_surface": 100.0}, "the slope is too steep: lambda = "),
+        (Chute(0.3, 1.0, 1.0, 0.6), {"Q": 3.0}, "elastic grains lose no energy inside"),
+        (Chute(0.3, 0.9, 0.6, 0.8), {"Q": 1e-3}, "no flow has Q = 0.001: those of this chute have 4.3"),
+    ],
+)
+def test_why_there_is_none(chute, condition, reason):
+    found = flows(chute, **condition)
+    assert len(found) == 0
+    assert found.reason is not None
+    assert reason in found.reason
+
+
+def test_elastic_grains_flow_where_the_base_takes_energy():
+    found = flows(Chute(0.3, 1.0, 0.0, 0.8), Q=3.0)
+    assert len(found) == 1
+    assert found[0].interior == "productive"
+    assert float(found[0].profile(0.0).heat_flux) < 0.0
+
+
+def test_hot_flows_between_the_printed_bound_and_the_exact_one():
+    # lambda = 2.91 lies between 2.284, printed, and 3, exact (section 4.3)
+    found = flows(Chute(0.4, 0.8, 0.8, 0.6), T_surface=500.0)
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "give exactly one of Q, M, h and T_surface: got none"),
+        ({"Q": 1.0, "M": 2.0}, "got Q, M"),
+        ({"Q": 0.0}, "Q = 0: must be from"),
+        ({"Q": -1.0}, "Q = -1: must be from"),
+        ({"Q": float("nan")}, "Q = nan: must be from"),
+        ({"Q": "three"}, "Q = 'three': must be a number"),
+        ({"T_surface": 1e300}, "T_surface = 1e\\+300"),
+        ({"Q": 3.0, "tolerance": 1.0}, "tolerance 1: must be"),
+        ({"Q": 3.0, "surface_temperature": (10.0, 1.0)}, "must rise"),
+        ({"Q": 3.0, "largest_holdup": -1.0}, "largest hold-up -1"),
+    ],
+)
+def test_bad_input(given, message):
+    with pytest.raises(InputError, match=message):
+        flows(PAPER, **given)
+
+
+def test_a_flow_set_is_a_sequence():
+    found = flows(PAPER, Q=3.0)
+    assert len(found) == 3
+    assert list(found[:2]) == [found[0], found[1]]
+    assert found[-1].surface_temperature == min(f.surface_temperature for f in found)
+    assert np.isfinite([f.mass_flux for f in found]).all()

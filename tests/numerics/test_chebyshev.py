@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from chuteflow.numerics.chebyshev import grid, interpolation_matrix, refinement, tail
+
+
+@pytest.mark.parametrize("degree", [2, 5, 16, 37])
+def test_polynomials_up_to_the_degree_are_exact(degree):
+    g = grid(degree)
+    polynomial = np.polynomial.Polynomial(np.random.default_rng(degree).normal(size=degree + 1))
+    values = polynomial(g.nodes)
+    size = np.abs(values).max() * degree**2
+    np.testing.assert_allclose(g.derivative @ values, polynomial.deriv()(g.nodes), atol=1e-13 * size)
+    np.testing.assert_allclose(g.integral @ values, polynomial.integ()(g.nodes), atol=1e-15 * size)
+    np.testing.assert_allclose(g.weights @ values, polynomial.integ()(1.0), atol=1e-15 * size)
+    points = np.array([0.0, 0.123, g.nodes[1], 0.987, 1.0])
+    np.testing.assert_allclose(interpolation_matrix(g, points) @ values, polynomial(points), atol=1e-14 * size)
+
+
+def test_a_smooth_function_converges_exponentially():
+    errors = []
+    for degree in (8, 16, 32):
+        g = grid(degree)
+        errors.append(np.abs(g.derivative @ np.exp(-3.0 * g.nodes) + 3.0 * np.exp(-3.0 * g.nodes)).max())
+    assert errors[1] < 1e-6 * errors[0]
+    assert errors[2] < 1e-11
+
+
+def test_the_smallest_spacing_keeps_its_digits():
+    n = 200
+    assert grid(n).nodes[1] == pytest.approx(np.sin(np.pi / (2 * n)) ** 2, rel=1e-15)
+
+
+def test_refinement_and_tail():
+    coarse, fine = grid(16), grid(24)
+    values = 1.0 / (1.2 + coarse.nodes)
+    np.testing.assert_allclose(refinement(16, 24) @ values, 1.0 / (1.2 + fine.nodes), atol=1e-11)
+    assert tail(coarse, values) < 1e-9
+    assert tail(coarse, np.abs(coarse.nodes - 0.4)) > 1e-4
+
+
+def test_a_degree_below_two_is_refused():
+    with pytest.raises(ValueError, match="at least 2"):
+        grid(1)

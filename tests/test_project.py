@@ -1,0 +1,214 @@
+"""The project itself: what is imported, in which direction, and what its files say of it."""
+
+import ast
+import importlib.metadata
+import re
+import shutil
+import subprocess
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import chuteflow
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "src" / "chuteflow"
+
+# Ground floor first; a module imports from its own layer and from those before it.
+LAYERS = ("numerics", "theory", "steady", "analysis", "paper", "faces")
+# What `import chuteflow` offers is made of the layers up to this one, so only those above it may use it.
+PUBLIC_API = "analysis"
+
+MODULES = {
+    ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in sorted(SOURCE.rglob("*.py"))
+}
+
+
+# The installed package
+
+
+def test_the_installed_package_is_tested_not_the_source_folder():
+    assert not Path(chuteflow.__file__).resolve().is_relative_to(SOURCE.parent)
+
+
+def test_the_installed_package_is_that_of_the_source_folder():
+    installed = Path(chuteflow.__file__).parent
+
+    def contents(folder: Path) -> dict[str, bytes]:
+        return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*.py")}
+
+    there, here = contents(installed), contents(SOURCE)
+    differing = {name for name in there.keys() | here.keys() if there.get(name) != here.get(name)}
+    assert not differing, "the installed wheel is out of date; `make test` renews it"
+
+
+def test_versions_agree():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert chuteflow.__version__ == project["version"]
+    assert importlib.metadata.version("chuteflow") == project["version"]
+    assert re.findall(r"^version: *(\S+)$", citation, re.MULTILINE) == [project["version"]]
+
+
+# The layers
+
+
+def layer_of(module: str) -> str | None:
+    """The layer that a dotted name belongs to; None for the modules at the top of the package."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 and parts[1] in LAYERS else None
+
+
+def imported_from_package(module: str, source: str, *, is_package: bool = False) -> Iterator[tuple[int, str]]:
+    """Line number and dotted name of everything of chuteflow that the source imports, wherever in it."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = module.split(".")
+            base = base[: len(base) - node.level + is_package] if node.level else []
+            start = ".".join(base + (node.module.split(".") if node.module else []))
+            names = [f"{start}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        for name in names:
+            if name.split(".")[0] == "chuteflow":
+                yield node.lineno, name
+
+
+def upward_edges(module: str, source: str, *, is_package: bool = False) -> list[str]:
+    """What a module imports from above itself, as sentences; the root and __main__ import freely."""
+    if module in ("chuteflow", "chuteflow.__main__"):
+        return []
+    layer = layer_of(module)
+    height = LAYERS.index(layer) if layer else -1
+    found = []
+    for line, name in imported_from_package(module, source, is_package=is_package):
+        target = layer_of(name)
+        if target:
+            upward = LAYERS.index(target) > height
+        elif name != "chuteflow" and ".".join(name.split(".")[:2]) in MODULES:
+            upward = False
+        else:
+            upward = height <= LAYERS.index(PUBLIC_API)
+        if upward:
+            found.append(f"{module}, line {line}, imports {name}")
+    return found
+
+
+def test_every_folder_of_the_package_is_a_layer():
+    folders = {path.relative_to(SOURCE).parts[0] for path in SOURCE.rglob("*.py") if path.parent != SOURCE}
+    assert folders <= set(LAYERS)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_go_downward(module):
+    path = MODULES[module]
+    source = path.read_text(encoding="utf-8")
+    assert upward_edges(module, source, is_package=path.name == "__init__.py") == []
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("chuteflow.numerics.newton", "import chuteflow.theory.closures"),
+        ("chuteflow.numerics.newton", "from chuteflow import theory"),
+        ("chuteflow.numerics.newton", "from ..theory import closures"),
+        ("chuteflow.theory.closures", "from chuteflow.steady.solver import solve"),
+        ("chuteflow.steady.solver", "def f():\n    from ..analysis import curves"),
+        ("chuteflow.analysis.curves", "from .. import paper"),
+        ("chuteflow.analysis.curves", "import chuteflow"),
+        ("chuteflow.analysis.curves", "from chuteflow import Chute"),
+        ("chuteflow.paper.figures", "from chuteflow.faces.plots import draw"),
+        ("chuteflow.errors", "from chuteflow import numerics"),
+    ],
+)
+def test_an_upward_import_is_seen(module, source):
+    assert len(upward_edges(module, source)) == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("chuteflow.numerics.newton", "import numpy\nfrom . import grids\nfrom .grids import nodes"),
+        ("chuteflow.steady.solver", "from ..theory.closures import f_1\nfrom chuteflow import numerics"),
+        ("chuteflow.paper.figures", "import chuteflow\nfrom chuteflow import Chute, flows"),
+        ("chuteflow.faces.cli", "from .. import __version__\nfrom ..paper import figures"),
+    ],
+)
+def test_a_downward_import_is_allowed(module, source):
+    assert upward_edges(module, source) == []
+
+
+def test_a_package_is_the_base_of_its_relative_imports():
+    assert list(imported_from_package("chuteflow.steady", "from .solver import f", is_package=True)) == [
+        (1, "chuteflow.steady.solver.f")
+    ]
+
+
+def test_only_the_faces_print():
+    calls = [
+        f"{module}, line {node.lineno}"
+        for module, path in MODULES.items()
+        if layer_of(module) != "faces"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+    ]
+    assert calls == []
+
+
+# The files
+
+# Put together here, so that this file does not hold what it looks for.
+OWN_FOLDERS = re.compile(r"(?<![\w.~)}-])/(?:" + "|".join(("work", "root", "home")) + r")(?![\w-])")
+REGISTRIES = re.compile(
+    "|".join(
+        re.escape(".".join(host))
+        for host in [("pypi", "org"), ("pypi", "python", "org"), ("pythonhosted", "org"), ("anaconda", "org")]
+    )
+)
+
+
+def project_files() -> list[Path]:
+    """The files that are, or would be, committed."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    # A checkout may belong to another user than the one who tests it.
+    command = [git, "-c", "safe.directory=*", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    return [ROOT / name for name in listed.split("\0") if name and (ROOT / name).is_file()]
+
+
+def local_places(text: str) -> list[str]:
+    """Lines of a text that name a folder of one machine or a package registry."""
+    return [line for line in text.splitlines() if OWN_FOLDERS.search(line) or REGISTRIES.search(line)]
+
+
+def test_no_file_names_a_folder_of_one_machine_or_a_registry():
+    found = []
+    for path in project_files():
+        content = path.read_bytes()
+        if b"\0" not in content:
+            text = content.decode("utf-8", errors="replace")
+            found += [f"{path.relative_to(ROOT)}: {line.strip()[:100]}" for line in local_places(text)]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "is_local"),
+    [
+        ("open('/" + "home/someone/x')", True),
+        ("file:///" + "root/x", True),
+        ("cd /" + "work", True),
+        ("--index-url https://" + "pypi" + ".org/simple", True),
+        ("the frame/work of 1/root", False),
+        ("https://example.org/home/page", False),
+        ("$(HOME)/work and ~/work", False),
+    ],
+)
+def test_local_places_are_seen(line, is_local):
+    assert bool(local_places(line)) == is_local
