@@ -29,7 +29,7 @@ METADATA := pyproject.toml $(wildcard README.md LICENSE)
 # Looked up by the shell, not by $(wildcard), which would remember the folder as it was before the build.
 WHEEL = $$(echo dist/chuteflow-*.whl)
 
-.PHONY: help demo test test-all lint types unit bench wheel dist clean
+.PHONY: help demo test test-all lint types unit docs bench wheel dist clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
@@ -58,7 +58,11 @@ lint: $(VENV)/.packages-test ## style of the code
 types: $(VENV)/.packages-test ## types of the code
 	$(BIN)/basedpyright
 
-bench: $(VENV)/.package $(VENV)/.packages-run ## time the solver
+docs: $(VENV)/.package $(VENV)/.packages-test ## build the documentation into build/docs/, without network
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs build/docs
+	@echo "The documentation is at $(CURDIR)/build/docs/index.html"
+
+bench: $(VENV)/.package $(VENV)/.packages-bench ## time the solver, beside what one would pick instead
 	$(BIN)/python benchmarks/run.py
 
 wheel: dist/.built ## build the wheel into dist/
@@ -98,4 +102,9 @@ $(VENV)/.packages-run: pyproject.toml constraints.txt | $(VENV)/.package
 $(VENV)/.packages-test: pyproject.toml constraints.txt | $(VENV)/.packages-run
 	@echo "== installing the packages that test it"
 	@$(INSTALL) "$(WHEEL)[test]"
+	@touch $@
+
+$(VENV)/.packages-bench: pyproject.toml constraints.txt | $(VENV)/.packages-run
+	@echo "== installing the packages that it is compared with"
+	@$(INSTALL) "$(WHEEL)[bench]"
 	@touch $@

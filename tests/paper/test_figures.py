@@ -11,7 +11,8 @@ import pytest
 from chuteflow.faces.cli import main
 from chuteflow.paper import figure_02, figure_03, style
 from chuteflow.paper.data import csv_text
-from chuteflow.paper.figures import FIGURES, figure
+from chuteflow.paper.figures import FIGURES, figure, method_note
+from chuteflow.paper.sources import OVERBURDEN
 
 #: The caption of figure 2: T_surface, h and M, to the digits printed. The paper has 0.19 for the 0.197 of C.
 PRINTED = {"A": (7.34, 8.84, 0.44), "B": (2.54, 3.98, 0.59), "C": (0.197, 1.77, 1.26)}
@@ -172,7 +173,8 @@ def test_the_command_writes_pictures_and_data(kind, tmp_path, capsys):
     begins = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[kind]
     assert (out / f"figure_02.{kind}").read_bytes().startswith(begins)
     assert len(capsys.readouterr().out.splitlines()) == 2
-    assert (out / "figure_02.csv").read_text(encoding="utf-8") == csv_text(PROFILES)
+    written = csv_text(PROFILES, method_note(2, OVERBURDEN))
+    assert (out / "figure_02.csv").read_text(encoding="utf-8") == written
 
 
 def test_a_picture_is_the_same_bytes_each_time(tmp_path):

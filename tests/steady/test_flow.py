@@ -187,3 +187,18 @@ def test_every_quantity_of_the_registry_is_offered():
     profile = flow.sampled(5)
     for name in QUANTITIES:
         assert hasattr(flow, name) or hasattr(profile, name), name
+
+
+@pytest.mark.parametrize("surface", ["free", "interface"])
+def test_the_energy_budget_closes(surface):
+    for flow in flows(Chute(0.3, 0.8, 0.8, 0.6, surface), Q=3.0):
+        b = flow.energy_budget
+        assert b.heat_from_base + b.shear_work == pytest.approx(b.dissipation + b.heat_through_surface, rel=1e-9)
+
+
+def test_gravity_pays_for_all_of_it_on_the_half_line():
+    # The work of the weight along the slope, s Int nu u dz, goes into slip and shear alone.
+    for flow in flows(Chute(0.3, 0.8, 0.8, 0.6), Q=3.0):
+        b = flow.energy_budget
+        assert b.slip_work + b.shear_work == pytest.approx(0.3 * flow.mass_flux, rel=1e-9)
+        assert b.base_loss > 0.0

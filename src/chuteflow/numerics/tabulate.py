@@ -27,12 +27,12 @@ class Table:
     error: Array
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        """Values and derivatives, each (m,) + x.shape."""
+        """Values and derivatives, each (m,) + x.shape; a complex ``x`` belongs to the piece of its real part."""
         degree, pieces, _ = self.coefficients.shape
         scale = pieces / (self.upper - self.lower)
         # fmax and fmin turn a NaN into an end, so that the index exists; whoever made the NaN still has it.
         position = (np.fmin(np.fmax(x, self.lower), self.upper) - self.lower) * scale
-        index = np.minimum(position.astype(np.intp), pieces - 1)
+        index = np.minimum(position.real.astype(np.intp), pieces - 1)
         t = (2.0 * (position - index) - 1.0)[..., None]
         picked = self.coefficients.take(index, axis=1)
         value = picked[-1]
@@ -70,7 +70,7 @@ def antiderivative(table: Table) -> Table:
     degree, pieces, twice = table.coefficients.shape
     half = 0.5 * (table.upper - table.lower) / pieces
     powers = table.coefficients[:, :, : twice // 2]
-    coefficients = np.zeros((degree + 1, pieces, twice // 2))
+    coefficients = np.zeros((degree + 1, pieces, twice // 2), dtype=powers.dtype)
     coefficients[1:] = powers * (half / np.arange(1, degree + 1))[:, None, None]
     start = (coefficients * (-1.0) ** np.arange(degree + 1)[:, None, None]).sum(axis=0)
     gained = coefficients.sum(axis=0) - start

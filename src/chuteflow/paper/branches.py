@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from chuteflow import Branch, Flow
+from chuteflow.paper.sources import SteadyBranch, SteadyFlow
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
     """A flow of a branch; ``special`` is the kind of a special point, or empty."""
 
-    flow: Flow
+    flow: SteadyFlow
     special: str = ""
 
 
-def in_order(branch: Branch) -> Iterator[Point]:
+def in_order(branch: SteadyBranch) -> Iterator[Point]:
     """The flows of ``branch`` with its special points in their places."""
     for i, flow in enumerate(branch.flows):
         yield Point(flow)
@@ -30,14 +30,14 @@ class Run:
     """Consecutive flows of one kind of ``density``; neighbouring runs share the flow where they meet."""
 
     density: str
-    flows: tuple[Flow, ...]
+    flows: tuple[SteadyFlow, ...]
 
 
-def runs(branch: Branch) -> list[Run]:
+def runs(branch: SteadyBranch) -> list[Run]:
     """``branch`` cut where the density turns from monotonic to inverted or back."""
     kind = branch.flows[0].density
     found: list[Run] = []
-    current: list[Flow] = []
+    current: list[SteadyFlow] = []
     for point in in_order(branch):
         current.append(point.flow)
         turns = point.special == "density-inversion"

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow import Branch, Chute, Curve, curve
+from chuteflow import Chute
 from chuteflow.paper import style
-from chuteflow.paper.branches import Point, in_order, runs
+from chuteflow.paper.branches import in_order, runs
 from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.sources import Source, SteadyBranch, SteadyCurve, reach
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,20 +27,19 @@ class Curves:
 
     title: str
     key: str
-    curves: dict[Any, Curve]
+    curves: dict[Any, SteadyCurve]
 
     def table(self) -> Table:
         """The branches of all curves, special points in their places, one below the other."""
         groups = {
-            (name, number): _columns(list(in_order(branch)), number)
+            (name, number): _columns(branch, number)
             for name, found in self.curves.items()
             for number, branch in enumerate(found.branches, 1)
         }
         columns = stacked(self.key, groups)
         columns[self.key] = [name for name, _ in columns[self.key]]
-        low, high = next(iter(self.curves.values())).searched.surface_temperature
-        traced = f"all flows with surface temperatures from {low} to {high}"
-        return Table(self.title, (traced, *(chute_note(found.chute) for found in self.curves.values())), columns)
+        notes = [note for found in self.curves.values() for note in (chute_note(found.chute), *reach(found))]
+        return Table(self.title, tuple(notes), columns)
 
     def flows_at(self, name: Any, mass_flux: float) -> int:
         """How many flows of a curve have this mass flux, counted between its points."""
@@ -47,28 +48,26 @@ class Curves:
         )
 
 
-def _columns(points: list[Point], number: int) -> dict[str, list[Any]]:
+def _columns(branch: SteadyBranch, number: int) -> dict[str, list[Any]]:
+    points = list(in_order(branch))
+    status = ["converged"] * len(points)
+    for i, end in zip((0, -1), branch.ends, strict=True):
+        status[i] = f"converged; here the curve ends: {end}"
     return {
         "branch": [number] * len(points),
         **{name: [getattr(point.flow, name) for point in points] for name in NUMBERS},
         "density": [point.flow.density for point in points],
         "special": [point.special for point in points],
+        "status": status,
     }
 
 
-def trace(
-    title: str,
-    key: str,
-    chutes: Iterable[Chute],
-    surface_temperature: tuple[float, float] = (1e-3, 1e4),
-    points: int = 150,
-) -> Curves:
+def trace(title: str, key: str, chutes: Iterable[Chute], source: Source) -> Curves:
     """The curves of ``chutes``, which differ in ``key``."""
-    found = (curve(chute, surface_temperature=surface_temperature, points=points) for chute in chutes)
-    return Curves(title, key, {getattr(c.chute, key): c for c in found})
+    return Curves(title, key, {getattr(found.chute, key): found for found in source.curves(list(chutes))})
 
 
-def draw_densities(ax: Axes, found: Curve, **settings: Any) -> None:
+def draw_densities(ax: Axes, found: SteadyCurve, **settings: Any) -> None:
     """Centre of mass against mass flux: solid where the density is inverted, dashed where it is monotonic."""
     for branch in found.branches:
         for run in runs(branch):
@@ -80,7 +79,7 @@ def draw_densities(ax: Axes, found: Curve, **settings: Any) -> None:
             )
 
 
-def draw_plain(ax: Axes, found: Curve, stroke: style.Stroke, name: str | None = None) -> None:
+def draw_plain(ax: Axes, found: SteadyCurve, stroke: style.Stroke, name: str | None = None) -> None:
     """Centre of mass against mass flux in one stroke."""
     for i, branch in enumerate(found.branches):
         points = [point.flow for point in in_order(branch)]
@@ -92,24 +91,28 @@ def draw_plain(ax: Axes, found: Curve, stroke: style.Stroke, name: str | None = 
         )
 
 
-def hot_end(branch: Branch, centre_of_mass: float) -> float:
+def hot_end(branch: SteadyBranch, centre_of_mass: float) -> float:
     """Mass flux where the hot end of ``branch`` passes through ``centre_of_mass``, of the plotted line."""
     h, q = branch.centre_of_mass, branch.mass_flux
     below = int(np.argmax(h < centre_of_mass))
     return float(np.interp(centre_of_mass, h[[below, below - 1]], q[[below, below - 1]]))
 
 
-def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, top: float, head: float = 0.84) -> None:
-    """The slopes at the hot ends of their curves, where these leave the panel at ``top``, under a heading.
-
-    The heading ends at the share ``head`` of the width.
-    """
+def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, top: float) -> None:
+    """The slopes at the hot ends of their curves, where these leave the panel at ``top``, and a heading in the
+    widest gap between them."""
     places = sorted((hot_end(found.curves[name].branches[0], top), name) for name in names)
-    x = 0.04 * right  # clear of the letter of the panel
+    labels: list[float] = []
     for place, name in places:
-        x = max(place, x + 0.034 * right)
-        style.write(ax, x, top, f"{name:.2f}", xytext=(1.0, 2.0), rotation=60, rotation_mode="anchor", ha="left")
-    style.write(ax, head * right, top, r"slope $\tan\theta$", xytext=(0.0, 13.0), ha="right")
+        labels.append(max(place, labels[-1] + 0.034 * right) if labels else place)
+        style.write(
+            ax, labels[-1], top, f"{name:.2f}", xytext=(1.0, 2.0), rotation=60, rotation_mode="anchor", ha="left"
+        )
+    width, begin = max((after - before, before) for before, after in pairwise([*labels, right]))
+    # The labels lean to the right.
+    style.write(ax, begin + 0.54 * width, top, r"slope $\tan\theta$", xytext=(0.0, 13.0), ha="center")
+    # The letter of the panel stands clear of them.
+    ax.set_title(ax.get_title(loc="left"), loc="left", x=-0.12, **style.title())
 
 
 def frame(ax: Axes, right: float, top: float, *, ordinate: bool = True) -> None:

@@ -45,11 +45,13 @@ def chute_note(chute: Chute) -> str:
     return "chute: " + ", ".join(f"{name} = {value}" for name, value in chute.as_dict().items())
 
 
-def csv_text(data: FigureData) -> str:
-    """The table as CSV, numbers with all their digits."""
+def csv_text(data: FigureData, *notes: str) -> str:
+    """The table as CSV, numbers with all their digits; ``notes`` go above it."""
     table = data.table()
     text = io.StringIO()
-    text.writelines(f"# {line}\n" for line in (table.title, *table.notes, f"chuteflow {__version__}, dimensionless"))
+    text.writelines(
+        f"# {line}\n" for line in (table.title, *notes, *table.notes, f"chuteflow {__version__}, dimensionless")
+    )
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
     for row in zip(*table.columns.values(), strict=True):

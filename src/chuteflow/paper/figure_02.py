@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows
+from chuteflow import Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +37,7 @@ RIGHT = (0.4, 10.0, 10.0)
 class Figure2:
     """The flows by name, and their profiles on common heights."""
 
-    flows: dict[str, Flow]
+    flows: dict[str, SteadyFlow]
     profiles: dict[str, Profile]
 
     def table(self) -> Table:
@@ -57,9 +58,9 @@ class Figure2:
         return Table(title, (chute_note(dissipative(SLOPE)), *notes), columns)
 
 
-def compute() -> Figure2:
+def compute(source: Source = OVERBURDEN) -> Figure2:
     """The three flows and their profiles."""
-    found = dict(zip(STROKES, flows(dissipative(SLOPE), Q=MASS_FLUX), strict=True))
+    found = dict(zip(STROKES, source.flows(dissipative(SLOPE), Q=MASS_FLUX), strict=True))
     z = np.linspace(0.0, TOP, POINTS)
     return Figure2(found, {name: flow.profile(z) for name, flow in found.items()})
 

@@ -7,20 +7,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow import Branch, Curve, Flow, curve, flows
 from chuteflow.paper import style
 from chuteflow.paper.branches import in_order
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import (
+    OVERBURDEN,
+    SURFACE_TEMPERATURE,
+    Source,
+    SteadyBranch,
+    SteadyCurve,
+    SteadyFlow,
+    reach,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MASS_FLUX = 3.0
 SLOPE = 0.3
-#: Surface temperatures traced; the flows drawn lie well inside.
-SURFACE_TEMPERATURE = (1e-3, 100.0)
-POINTS = 400
+#: Flows on the curve.
+POINTS = 500
 #: Abscissa and ordinate of each panel, where the panel ends, and where the flows are named.
 PANELS = (
     ("mass_flux", "centre_of_mass", 6.0, 15.0, ("right", "above right", "above left")),
@@ -34,8 +41,8 @@ NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 class Figure3:
     """The curve, and the flows of figure 2 by name."""
 
-    curve: Curve
-    flows: dict[str, Flow]
+    curve: SteadyCurve
+    flows: dict[str, SteadyFlow]
 
     def table(self) -> Table:
         """The branches and then the named flows, one below the other."""
@@ -49,15 +56,18 @@ class Figure3:
             for branch in self.curve.branches
             for point in branch.special
         ]
+        ends = [f"family {i} ends: {', and '.join(branch.ends)}" for i, branch in enumerate(self.curve.branches, 1)]
         title = "Figure 3: centre of mass, mass hold-up and mass flux of all flows"
-        return Table(title, (chute_note(self.curve.chute), *special), stacked("flows", groups))
+        return Table(
+            title, (chute_note(self.curve.chute), *reach(self.curve), *ends, *special), stacked("flows", groups)
+        )
 
 
-def compute() -> Figure3:
+def compute(source: Source = OVERBURDEN) -> Figure3:
     """The family of flows, and its flows at Q = 3."""
     chute = dissipative(SLOPE)
-    traced = curve(chute, surface_temperature=SURFACE_TEMPERATURE, points=POINTS)
-    return Figure3(traced, dict(zip("ABC", flows(chute, Q=MASS_FLUX), strict=True)))
+    (traced,) = source.curves([chute], SURFACE_TEMPERATURE, POINTS)
+    return Figure3(traced, dict(zip("ABC", source.flows(chute, Q=MASS_FLUX), strict=True)))
 
 
 def draw(data: Figure3) -> Figure:
@@ -74,10 +84,10 @@ def draw(data: Figure3) -> Figure:
     return figure
 
 
-def _line(branch: Branch, x: str, y: str) -> tuple[Any, Any]:
+def _line(branch: SteadyBranch, x: str, y: str) -> tuple[Any, Any]:
     columns = _columns([point.flow for point in in_order(branch)])
     return columns[x], columns[y]
 
 
-def _columns(found: list[Flow]) -> dict[str, Any]:
+def _columns(found: list[SteadyFlow]) -> dict[str, Any]:
     return {name: np.array([getattr(flow, name) for flow in found]) for name in NUMBERS}

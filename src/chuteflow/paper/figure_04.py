@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 from chuteflow.paper import slopes
 from chuteflow.paper.curves import Curves
+from chuteflow.paper.sources import OVERBURDEN, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def compute() -> Curves:
+def compute(source: Source = OVERBURDEN) -> Curves:
     """The curves on the half-line."""
-    return slopes.compute("Figure 4: centre of mass against mass flux over slopes", "free")
+    return slopes.compute("Figure 4: centre of mass against mass flux over slopes", "free", source)
 
 
 def draw(data: Curves) -> Figure:

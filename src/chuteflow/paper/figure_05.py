@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows
+from chuteflow import Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note
 from chuteflow.paper.materials import productive
+from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +29,7 @@ LIMITS = ((0.0, 0.01), (33.5, 36.0), (0.0, 15.0))
 class Figure5:
     """The flow, its profile, and its largest temperature with the height where it is."""
 
-    flow: Flow
+    flow: SteadyFlow
     profile: Profile
     largest_temperature: float
     height_of_largest: float
@@ -45,9 +46,9 @@ class Figure5:
         return Table(f"Figure 5: profiles of the productive flow with mass flux {MASS_FLUX}", notes, columns)
 
 
-def compute() -> Figure5:
+def compute(source: Source = OVERBURDEN) -> Figure5:
     """The one flow and its profile."""
-    (flow,) = flows(productive(SLOPE), Q=MASS_FLUX)
+    (flow,) = source.flows(productive(SLOPE), Q=MASS_FLUX)
     profile = flow.profile(np.linspace(0.0, TOP, POINTS))
     hottest = int(np.argmax(profile.granular_temperature))
     below, above = profile.height[max(hottest - 1, 0)], profile.height[min(hottest + 1, POINTS - 1)]
@@ -64,7 +65,7 @@ def draw(data: Figure5) -> Figure:
         style.name_axes(ax, style.label(field), style.label("height") if ax is axes[0] else None)
         ax.set_xlim(*limits)
         ax.set_ylim(0.0, TOP)
-    axes[0].set_xticks([0.0, 0.005, 0.01])
+    axes[0].set_xticks([0.0, 0.005, 0.01], ["0", "0.005", "0.01"])
     far = data.flow.surface_temperature
     excess = data.largest_temperature - far
     small = style.inset(axes[1], (0.2, 0.3, 0.42, 0.55))

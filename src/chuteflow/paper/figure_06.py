@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_densities, frame, name_slopes, trace
 from chuteflow.paper.materials import productive
+from chuteflow.paper.sources import OVERBURDEN, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,10 +17,10 @@ SLOPES = (0.4, 0.41, 0.42, 0.43, 0.44)
 RIGHT, TOP = 4.0, 40.0
 
 
-def compute() -> Curves:
+def compute(source: Source = OVERBURDEN) -> Curves:
     """The curves of all slopes."""
     title = "Figure 6: centre of mass against mass flux of productive flows"
-    return trace(title, "slope", [productive(slope) for slope in SLOPES])
+    return trace(title, "slope", [productive(slope) for slope in SLOPES], source)
 
 
 def draw(data: Curves) -> Figure:
@@ -28,7 +29,7 @@ def draw(data: Curves) -> Figure:
     for found in data.curves.values():
         draw_densities(ax, found)
     frame(ax, RIGHT, TOP)
-    name_slopes(ax, data, SLOPES, RIGHT, TOP, head=0.76)
+    name_slopes(ax, data, SLOPES, RIGHT, TOP)
     ax.plot([], [], label="monotonic density", **style.Stroke(style.BLACK, style.OF_DENSITY["monotonic"]).line())
     style.legend(ax, loc="lower right")
     return figure

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows
+from chuteflow import Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +31,7 @@ LINES = {
 class Figure7:
     """Flows and profiles by temperature and surface condition."""
 
-    flows: dict[tuple[str, str], Flow]
+    flows: dict[tuple[str, str], SteadyFlow]
     profiles: dict[tuple[str, str], Profile]
 
     def table(self) -> Table:
@@ -54,12 +55,12 @@ class Figure7:
         return Table(title, (*chutes, *notes), named | columns)
 
 
-def compute() -> Figure7:
+def compute(source: Source = OVERBURDEN) -> Figure7:
     """The three flows of each surface condition."""
     found = {
         (name, surface): flow
         for surface in LINES
-        for name, flow in zip(FLOWS, flows(dissipative(SLOPE, surface), Q=MASS_FLUX), strict=True)
+        for name, flow in zip(FLOWS, source.flows(dissipative(SLOPE, surface), Q=MASS_FLUX), strict=True)
     }
     profiles = {
         (name, surface): flow.profile(np.linspace(0.0, min(flow.interface_height, FLOWS[name][1]), POINTS))

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 
 from chuteflow.paper import slopes
 from chuteflow.paper.curves import Curves
+from chuteflow.paper.sources import OVERBURDEN, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def compute() -> Curves:
+def compute(source: Source = OVERBURDEN) -> Curves:
     """The curves of the collisional layer below the interface."""
-    return slopes.compute("Figure 9: as figure 4 with interface conditions", "interface")
+    return slopes.compute("Figure 9: as figure 4 with interface conditions", "interface", source)
 
 
 def draw(data: Curves) -> Figure:

@@ -9,6 +9,7 @@ import numpy as np
 from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_plain, hot_end, trace
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,22 +20,23 @@ WINDOW_Q, WINDOW_H = (1e-2, 1e2), (1e-1, 1e4)
 LINE_Q, LINE_END = np.array([0.25, 1.0]), 7e3
 
 
-def compute() -> Curves:
+def compute(source: Source = OVERBURDEN) -> Curves:
     """The curves of all slopes."""
     title = "Figure 10: centre of mass against mass flux, logarithmic"
-    return trace(title, "slope", [dissipative(slope) for slope in SLOPES])
+    return trace(title, "slope", [dissipative(slope) for slope in SLOPES], source)
 
 
 def draw(data: Curves) -> Figure:
     """One panel with logarithmic axes, and a dashed line of slope 2."""
     figure, (ax,) = style.panels(1, width=4.4, height=3.8)
+    places = []
     for slope, found in data.curves.items():
         draw_plain(ax, found, style.Stroke())
-        place = hot_end(found.branches[0], 0.999 * WINDOW_H[1])
-        style.write(ax, place, WINDOW_H[1], f"{slope:.2f}", xytext=(2.0, 3.0), rotation=60, rotation_mode="anchor")
+        places.append(hot_end(found.branches[0], 0.999 * WINDOW_H[1]))
+        style.write(ax, places[-1], WINDOW_H[1], f"{slope:.2f}", xytext=(2.0, 3.0), rotation=60, rotation_mode="anchor")
     ax.plot(LINE_Q, LINE_END * LINE_Q**2, **style.Stroke(style.VERMILION, style.DASHED).line())
     style.write(ax, LINE_Q[0], LINE_END * LINE_Q[0] ** 2, r"$h \sim Q^2$", xytext=(-4.0, 0.0), ha="right")
-    style.write(ax, 0.5 * LINE_Q[1], WINDOW_H[1], r"slope $\tan\theta$", xytext=(0.0, 8.0), ha="left")
+    style.write(ax, min(places), WINDOW_H[1], r"slope $\tan\theta$", xytext=(-8.0, 8.0), ha="right")
     style.name_axes(ax, style.label("mass_flux"), style.label("centre_of_mass"))
     ax.set(xscale="log", yscale="log", xlim=WINDOW_Q, ylim=WINDOW_H)
     return figure

@@ -20,6 +20,9 @@ SLOPES = np.linspace(0.15, 0.7, 551)
 #: Ordinates of the panels.
 LAMBDA, DELTA = (-30.0, 15.0), (-3.0, 2.5)
 
+#: Where marked values of lambda are written, if not above to the left.
+SIDES = {0.0: "above right", 1.0: "below right"}
+
 
 @dataclass(frozen=True, eq=False)
 class Figure11:
@@ -74,7 +77,7 @@ def draw(data: Figure11) -> Figure:
         ax.set_ylim(*limits)
     for value, slope in data.marks.items():
         text = f"{value:.3g}"
-        style.name_point(axes[0], slope, value, text, "above left" if value else "above right")
+        style.name_point(axes[0], slope, value, text, SIDES.get(value, "above left"))
     where = data.slope_of_divergence
     style.write(axes[0], where, LAMBDA[1], r"$\delta = 0$", xytext=(5.0, -2.0), va="top")
     style.write(axes[1], where, DELTA[1], "dissipative", xytext=(-6.0, -2.0), ha="right", va="top")

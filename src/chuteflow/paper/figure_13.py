@@ -14,6 +14,7 @@ from chuteflow import hot
 from chuteflow.errors import InputError
 from chuteflow.paper.hot_profiles import HotProfiles, draw_profiles, hot_profiles
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.theory.hot import slope_at
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ TOP, POINTS = 600.0, 301
 LIMITS = ((0.0, 0.006), (0.0, 300.0), (0.0, 80.0))
 
 
-def compute() -> HotProfiles:
+def compute(source: Source = OVERBURDEN) -> HotProfiles:
     """The exact solution and the flow, on the slope with lambda = 1."""
     chute = dissipative(0.3)
     slope = slope_at(hot(chute).parameters.dilute, chute.wall_restitution, chute.roughness, LAMBDA)
@@ -40,7 +41,7 @@ def compute() -> HotProfiles:
     z, P = _from_base_up(solution)
     title = "Figure 13: reduced system at lambda = 1 against the full equations"
     fields = solution.psi(P), solution.tau(P), solution.velocity(P, mu)
-    return hot_profiles(title, model.chute, TEMPERATURE, z, *fields)
+    return hot_profiles(title, model.chute, TEMPERATURE, z, fields, source)
 
 
 def _from_base_up(solution: HotSolution) -> tuple[Any, Any]:

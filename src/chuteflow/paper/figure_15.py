@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows
+from chuteflow import Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +36,7 @@ LINES = {
 class Figure15:
     """Flows and profiles by temperature and closure."""
 
-    flows: dict[tuple[str, str], Flow]
+    flows: dict[tuple[str, str], SteadyFlow]
     profiles: dict[tuple[str, str], Profile]
 
     def table(self) -> Table:
@@ -58,12 +59,12 @@ class Figure15:
         return Table(title, (*chutes, *notes), named | columns)
 
 
-def compute() -> Figure15:
+def compute(source: Source = OVERBURDEN) -> Figure15:
     """The three flows of each closure."""
     found = {
         (name, closure): flow
         for closure in LINES
-        for name, flow in zip(FLOWS, flows(dissipative(SLOPE, closure=closure), Q=MASS_FLUX), strict=True)
+        for name, flow in zip(FLOWS, source.flows(dissipative(SLOPE, closure=closure), Q=MASS_FLUX), strict=True)
     }
     profiles = {key: flow.profile(np.linspace(0.0, FLOWS[key[0]][0], POINTS)) for key, flow in found.items()}
     return Figure15(found, profiles)

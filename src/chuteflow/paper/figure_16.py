@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows
+from chuteflow import Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ LINES = {
 class Figure16:
     """Flows and profiles by temperature."""
 
-    flows: dict[str, Flow]
+    flows: dict[str, SteadyFlow]
     profiles: dict[str, Profile]
 
     def table(self) -> Table:
@@ -55,9 +56,9 @@ class Figure16:
         return Table(title, (chute_note(dissipative(SLOPE)),), columns)
 
 
-def compute() -> Figure16:
+def compute(source: Source = OVERBURDEN) -> Figure16:
     """The three flows and their profiles."""
-    found = dict(zip(FLOWS, flows(dissipative(SLOPE), Q=MASS_FLUX), strict=True))
+    found = dict(zip(FLOWS, source.flows(dissipative(SLOPE), Q=MASS_FLUX), strict=True))
     return Figure16(found, {name: flow.profile(np.linspace(0.0, FLOWS[name], POINTS)) for name, flow in found.items()})
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_plain, frame, trace
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import OVERBURDEN, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,10 +22,10 @@ LINES = {
 RIGHT, TOP = 6.0, 15.0
 
 
-def compute() -> Curves:
+def compute(source: Source = OVERBURDEN) -> Curves:
     """The two curves."""
     title = "Figure 17: centre of mass against mass flux, forms of the heat flux compared"
-    return trace(title, "closure", [dissipative(SLOPE, closure=closure) for closure in LINES])
+    return trace(title, "closure", [dissipative(SLOPE, closure=closure) for closure in LINES], source)
 
 
 def draw(data: Curves) -> Figure:

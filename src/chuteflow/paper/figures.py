@@ -1,11 +1,12 @@
 """The figures of the paper that can be drawn: a new one is one module here, and one row in the table.
 
-A module has ``compute()``, which gives the data of the figure through the public interface of the package alone,
-and ``draw(data)``, which makes a matplotlib figure of it.
+A module has ``compute(source)``, which gives the data of the figure from flows of a source, and ``draw(data)``, which
+makes a matplotlib figure of it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.paper.data import FigureData
+    from chuteflow.paper.sources import Source
 
 #: Numbers and titles.
 FIGURES = {
@@ -35,12 +37,22 @@ FIGURES = {
     17: "Centre of mass against mass flux with either heat flux",
 }
 
+#: Methods to compute flows by; the first is the default.
+METHODS = ("overburden", "mapped")
+#: Figures that the choice of a method does not change, and why: their ``compute`` takes no source.
+WITHOUT_METHOD = {
+    1: "a sketch",
+    11: "the reduced model alone",
+    14: "a search from the surface down, and the reduced model",
+}
+
 
 class FigureModule(Protocol):
     """What a module of a figure offers."""
 
-    def compute(self) -> FigureData:
-        """The data."""
+    @property
+    def compute(self) -> Callable[..., FigureData]:
+        """The data, from a source of flows, by default the overburden method."""
         ...
 
     def draw(self, data: Any) -> Figure:
@@ -53,3 +65,16 @@ def figure(number: int) -> FigureModule:
     if number not in FIGURES:
         raise KeyError(number)
     return cast("FigureModule", import_module(f"chuteflow.paper.figure_{number:02d}"))
+
+
+def computed(number: int, source: Source) -> FigureData:
+    """The data of figure ``number`` from the flows of ``source``."""
+    module = figure(number)
+    return module.compute() if number in WITHOUT_METHOD else module.compute(source)
+
+
+def method_note(number: int, source: Source) -> str:
+    """The method behind the data of figure ``number``, in words."""
+    if number in WITHOUT_METHOD:
+        return f"method: {WITHOUT_METHOD[number]}, whatever the choice of a method"
+    return f"method: {source.words}"

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow import Flow, Profile, flows, hot
+from chuteflow import Profile, hot
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.sources import Source, SteadyFlow
 from chuteflow.theory.hot import HotParameters
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ class HotProfiles:
     """A flow with its profile, and the same fields as the reduced system has them, at the same heights."""
 
     title: str
-    flow: Flow
+    flow: SteadyFlow
     lambda_: float
     profile: Profile
     reduced: dict[str, Any]
@@ -47,11 +48,13 @@ class HotProfiles:
         return float(np.abs(self.reduced[field] - full).max() / np.abs(full).max())
 
 
-def hot_profiles(title: str, chute: Chute, temperature: float, z: Any, psi: Any, tau: Any, U: Any) -> HotProfiles:
-    """The hot flow at T_inf = ``temperature`` against psi, tau and U of the reduced system at heights ``z``."""
+def hot_profiles(
+    title: str, chute: Chute, temperature: float, z: Any, fields: tuple[Any, Any, Any], source: Source
+) -> HotProfiles:
+    """The hot flow at T_inf = ``temperature`` against the ``fields`` psi, tau and U of the reduced system at ``z``."""
     parameters = hot(chute).parameters
-    flow = flows(chute, T_surface=temperature)[0]
-    return HotProfiles(title, flow, parameters.lambda_, flow.profile(z), _scaled(parameters, temperature, psi, tau, U))
+    flow = source.flows(chute, T_surface=temperature)[0]
+    return HotProfiles(title, flow, parameters.lambda_, flow.profile(z), _scaled(parameters, temperature, *fields))
 
 
 def _scaled(parameters: HotParameters, temperature: float, psi: Any, tau: Any, U: Any) -> dict[str, Any]:

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_densities, frame, name_slopes, trace
 from chuteflow.paper.materials import dissipative
+from chuteflow.paper.sources import Source, SteadyBranch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from chuteflow import Branch
 
 #: Slopes, and where the panels end in Q and h.
 PANELS = (
@@ -21,10 +20,10 @@ PANELS = (
 )
 
 
-def compute(title: str, surface: str) -> Curves:
+def compute(title: str, surface: str, source: Source) -> Curves:
     """The curves of all slopes."""
     slopes = sorted({slope for slopes, _, _ in PANELS for slope in slopes})
-    return trace(title, "slope", [dissipative(slope, surface) for slope in slopes])
+    return trace(title, "slope", [dissipative(slope, surface) for slope in slopes], source)
 
 
 def draw(data: Curves) -> Figure:
@@ -43,7 +42,7 @@ def draw(data: Curves) -> Figure:
     return figure
 
 
-def _name_cold_family(ax: Axes, slope: float, branch: Branch, right: float, top: float) -> None:
+def _name_cold_family(ax: Axes, slope: float, branch: SteadyBranch, right: float, top: float) -> None:
     flow = min(branch.flows, key=lambda flow: abs(flow.mass_flux - 0.8 * right))
     words = f"{slope:.2f}, a second family, surface $T \\leq {branch.surface_temperature.max():.2g}$"
     arrow = {"arrowstyle": "-", "linewidth": 0.6, "shrinkB": 0.0}

@@ -87,8 +87,13 @@ def panels(
     for index, ax in enumerate(axes):
         _calm(ax)
         if columns * rows > 1:
-            ax.set_title(f"({'abcdefghijkl'[index]})", loc="left", fontsize=_SIZE, fontfamily=_SERIF)
+            ax.set_title(f"({'abcdefghijkl'[index]})", loc="left", **title())
     return figure, axes
+
+
+def title() -> dict[str, Any]:
+    """Settings of the letters of panels."""
+    return {"fontsize": _SIZE, "fontfamily": _SERIF}
 
 
 def inset(ax: Axes, place: tuple[float, float, float, float]) -> Axes:

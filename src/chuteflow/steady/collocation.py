@@ -81,7 +81,10 @@ class Collocation:
 
 
 class State:
-    """Pointwise fields of discretised flows, residuals, integrals and exact derivatives."""
+    """Pointwise fields of discretised flows, residuals, integrals and exact derivatives.
+
+    Unknowns and parameters may be complex: a step along the imaginary axis differentiates all of this exactly.
+    """
 
     def __init__(self, problem: Collocation, z: Array) -> None:
         self.problem = problem
@@ -103,14 +106,17 @@ class State:
         self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
         self.net_loss = f[LOSS] - model.slope**2 * f[WORK]
         self.log_t = self.theta + f[GAMMA]
+        self.base_flux = model.base_flux(f[..., -1])
+        #: complex where any unknown or parameter is
+        self.dtype = np.result_type(self.y, self.base_flux)
 
     def residual(self) -> Array:
         """Surface condition, energy balance at the nodes below it, base condition, (n+2,)."""
         model = self.problem.model
-        r = np.empty((*self.p.shape[:-1], self.p.shape[-1] + 1))
+        r = np.empty((*self.p.shape[:-1], self.p.shape[-1] + 1), dtype=self.dtype)
         r[..., :-1] = self.p * (self.y_p - self.net_loss) + self.y * (1.0 + 0.5 * self.heating)
         r[..., 0] = self.y[..., 0] - model.surface_flux
-        r[..., -1] = self.y[..., -1] - model.base_flux(self.f[..., -1])
+        r[..., -1] = self.y[..., -1] - self.base_flux
         return r
 
     def jacobian(self) -> Array:
@@ -122,7 +128,7 @@ class State:
         y_log_x = df[CONDUCTION] * self.g / self.mass
         # Columns: g through the potential, then directly; theta at the surface; ln M.
         # ln x falls by the rise of theta, and rises by P/p with ln M.
-        y_z = np.empty((*p.shape, n + 2))
+        y_z = np.empty((*p.shape, n + 2), dtype=self.dtype)
         np.multiply(-y_log_x[..., None], problem.accumulate, out=y_z[..., :n])
         y_z[..., nodes, nodes] += f[CONDUCTION] / self.mass
         y_z[..., n] = -y_log_x
@@ -130,7 +136,7 @@ class State:
         heating_log_x = df[COUPLING] * (1.0 - self.rise)
         by_log_x = 0.5 * y * heating_log_x - p * (df[LOSS] - model.slope**2 * df[WORK])
         by_rise = 0.5 * y * (1.0 - f[COUPLING])
-        out = np.empty((*p.shape[:-1], n + 1, n + 2))
+        out = np.empty((*p.shape[:-1], n + 1, n + 2), dtype=self.dtype)
         body = out[..., :-1, :]
         np.matmul((p * self.s_p)[..., None] * problem.grid.derivative, y_z, out=body)
         body += (1.0 + 0.5 * self.heating)[..., None] * y_z
@@ -190,11 +196,11 @@ class State:
         moment = heights.sum(axis=-1)
         slip_log_x = model.slip_slope(df[..., -1]) / model.slip(self.f[..., -1])
         end = self._slip / flux
-        by_theta = np.empty((*self.p.shape[:-1], 2, n))
+        by_theta = np.empty((*self.p.shape[:-1], 2, n), dtype=self.dtype)
         by_theta[..., 0, :] = (glide * root_t - work_part) / flux[..., None]
         by_theta[..., 0, -1] += end * (root_t[..., -1] - slip_log_x)
         by_theta[..., 1, :] = heights * (1.0 + df[DENSITY]) / moment[..., None]
-        out = np.zeros((*self.p.shape[:-1], 4, n + 2))
+        out = np.zeros((*self.p.shape[:-1], 4, n + 2), dtype=self.dtype)
         out[..., :2, :n] = by_theta @ self.problem.accumulate
         out[..., :2, n] = by_theta.sum(axis=-1)
         glide_move = (glide * (2.0 + 0.5 * df[GAMMA] * laden) + work_part * laden).sum(axis=-1)

@@ -41,6 +41,28 @@ class Profile:
     dissipation: Array
 
 
+@dataclass(frozen=True)
+class EnergyBudget:
+    """Rates of fluctuation energy per unit area of the base, in rho_p (g d cos theta)^(3/2).
+
+    Slip at the base works ``slip_work``, of which collisions with the base take ``base_loss``; the rest is
+    ``heat_from_base``, negative where the base takes heat from the flow. With ``shear_work`` of the interior it
+    balances ``dissipation`` in collisions of the grains (3.3) and ``heat_through_surface``, which is 0 on the
+    half-line and negative at an interface, where the free grains bring heat.
+    """
+
+    slip_work: float
+    base_loss: float
+    shear_work: float
+    dissipation: float
+    heat_through_surface: float
+
+    @property
+    def heat_from_base(self) -> float:
+        """Flux of heat from the base into the flow, (2.15)."""
+        return self.slip_work - self.base_loss
+
+
 @dataclass(frozen=True, eq=False)
 class Flow:
     """A steady, fully developed flow on ``chute``.
@@ -147,6 +169,21 @@ class Flow:
         net = self._samples["net"]
         return float(net.min()), float(net.max())
 
+    @cached_property
+    def energy_budget(self) -> EnergyBudget:
+        """Where fluctuation energy comes from and goes to, in the whole flow."""
+        problem, state, model = self.solution.problem, self._state, self._model
+        pace = state.p * np.exp(0.5 * state.log_t)  # p sqrt(T)
+        per_node = problem.grid.weights / state.s_p * pace
+        slip_work = model.slope * float(state.p[-1]) * self.slip_velocity
+        return EnergyBudget(
+            slip_work=slip_work,
+            base_loss=slip_work - float(model.base_flux(state.f[:, -1]) * pace[-1]),
+            shear_work=model.slope**2 * float(per_node @ state.f[WORK]),
+            dissipation=float(per_node @ state.f[LOSS]),
+            heat_through_surface=model.surface_flux * float(pace[0]),
+        )
+
     def profile(self, z: ArrayLike) -> Profile:
         """All fields at heights ``z`` >= 0 (array), in any order; above an interface they are not defined.
 
@@ -160,6 +197,17 @@ class Flow:
             raise InputError(f"heights must be from 0 (base) to {highest}: got {flat.min()} to {flat.max()}")
         fields = self._fields(self._shares_at(flat))
         return Profile(height=z.copy(), **{name: values.reshape(z.shape) for name, values in fields.items()})
+
+    def at_overburden(self, share: ArrayLike) -> Profile:
+        """All fields where ``share`` (array, above 0 and at most 1) of the mass hold-up lies above, exactly there.
+
+        Raises:
+            InputError: for a share out of range.
+        """
+        share = np.asarray(share, dtype=float)
+        if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
+            raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
+        return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
         """All fields at ``points`` heights, spaced evenly from the base to ``top``, by default the depth."""

@@ -75,6 +75,8 @@ _CHECK = 1.25
 _SAFETY = 3.0
 #: With a larger residual between the nodes, a solution of the discrete equations is none of the equations.
 _SPURIOUS = 0.3
+#: Where X is below this share of its largest value, it falls with height: there a rise would be an error.
+_THIN = 0.05
 #: X may dip below zero in the far field by so much of its largest value.
 _DIP = 1e-3
 
@@ -284,6 +286,14 @@ class MappedSystem:
             momentum = np.abs(np.real(local.momentum)).max() / np.abs(x).max()
         return float(max(energy, momentum))
 
+    def density_excess(self, z: Array) -> float:
+        """Largest -d ln X/d zeta where the flow is not thin: positive where the volume fraction rises with height."""
+        a, _, _, _ = self.split(z)
+        zeta = np.sin(0.25 * np.pi * np.arange(2 * self.degree + 1) / self.degree) ** 2
+        x, dx = _series(a, zeta, 0), _series(a, zeta, 1)
+        thick = x > _THIN * x.max()
+        return float((-dx[thick] / x[thick]).max())
+
     def transferred(self, degree: int, multiple: int) -> tuple[MappedSystem, Array]:
         """The system of another degree and multiple, and the matrix that takes z, or a tangent, to it."""
         other = MappedSystem(self.chute, degree, multiple)
@@ -390,12 +400,16 @@ class _Evaluation:
         surface_z[self.n_x : -2] = m.basis[0, : self.n_y] * 2.0 / self.y_surface
         surface_z[-2] = 1.0
         # The hold-up above a node: nu z and nu u, integrated by parts, are this times dz and du.
-        above, above_z = kappa * (m.accumulate @ mass), kappa * (m.accumulate @ mass_z)
+        above = kappa * (m.accumulate @ mass)
+
+        def gradient_of_sum(weights: Array) -> Array:  # of weights . above, without the matrix of above's gradient
+            return kappa * ((weights @ m.accumulate) @ mass_z)
+
         holdup, holdup_z = kappa * (m.weights @ mass), kappa * (m.weights @ mass_z)
-        moment, moment_z = m.weights / omega @ above, m.weights / omega @ above_z  # over kappa S
+        moment, moment_z = m.weights / omega @ above, gradient_of_sum(m.weights / omega)  # over kappa S
         carried = slip * holdup + kappa * (m.weights @ (above * glide))  # Q over sqrt(S)
         carried_z = slip * holdup_z + holdup * slip_z
-        carried_z = carried_z + kappa * ((m.weights * glide) @ above_z + (m.weights * above) @ glide_z)
+        carried_z = carried_z + kappa * (gradient_of_sum(m.weights * glide) + (m.weights * above) @ glide_z)
         by_scale = np.zeros_like(surface_z)
         by_scale[-2] = 1.0
         root = np.sqrt(scale)
@@ -461,6 +475,11 @@ class MappedSolution:
     def surface_temperature(self) -> float:
         """T far above (half-line) or at the interface."""
         return float(np.exp(self.macroscopic[LOG_T]))
+
+    @cached_property
+    def density(self) -> str:
+        """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
+        return "inverted" if self.system.density_excess(self.z) > 0.0 else "monotonic"
 
     @property
     def map_length(self) -> float:

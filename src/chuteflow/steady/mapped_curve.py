@@ -7,39 +7,56 @@ two flows of one mass flux meet (section 3.5), is where d ln Q along the unit ta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control, Point, locate, trace
-from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
+from chuteflow.numerics.continuation import Control, Monitor, Point, locate, trace
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.mapped import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
 from chuteflow.steady.solver import Condition, Status
 
-#: How a curve is followed; lengths are in the plane (ln S, ln Q).
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-9, max_points=600)
+#: How a curve is followed; lengths are in the plane (ln S, ln Q). Points are solved again more closely.
+CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600)
 #: Range of T_surface followed unless another is asked for: few chutes are within reach of N = 400 below it.
 SURFACE_TEMPERATURE = (0.05, 100.0)
-#: A series that has decayed to this at the largest degree is still taken for a flow.
-_DECAYED = 1e-6
+#: Estimated relative error of Q, h and M up to which a flow is taken for one.
+TOLERANCE = 1e-8
 #: Relative error allowed in the flow from which a curve starts.
 _START_TOLERANCE = 1e-9
+#: Flows of a curve are at least so far apart: cold ones take many small steps, each with many coefficients.
+_SPACING = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class MappedPoint:
+    """A located point of a curve: ``kind`` is "fold-Q" or "density-inversion", ``position`` the index before it."""
+
+    kind: str
+    flow: MappedSolution
+    position: int
 
 
 @dataclass(frozen=True, eq=False)
 class MappedCurve:
     """A family of flows in order along its curve, from hot to cold at the start.
 
-    ``folds`` are the flows of turning mass flux, in the same order; ``ends`` says in words why the curve ends
-    at either side.
+    All are converged to TOLERANCE. ``special`` are the flows of turning mass flux and at the onset of a density
+    inversion, in the same order; ``ends`` says in words why the curve ends at either side.
     """
 
     flows: tuple[MappedSolution, ...]
-    folds: tuple[MappedSolution, ...]
+    special: tuple[MappedPoint, ...]
     ends: tuple[str, str]
+
+    @property
+    def folds(self) -> tuple[MappedSolution, ...]:
+        """The flows of turning mass flux."""
+        return tuple(point.flow for point in self.special if point.kind == "fold-Q")
 
     @property
     def mass_flux(self) -> Array:
@@ -51,13 +68,22 @@ class MappedCurve:
         """h along the curve, (3.27)."""
         return np.array([flow.centre_of_mass for flow in self.flows])
 
+    @property
+    def mass_holdup(self) -> Array:
+        """M along the curve, (3.27)."""
+        return np.array([flow.mass_holdup for flow in self.flows])
+
+    @property
+    def surface_temperature(self) -> Array:
+        """T_surface along the curve."""
+        return np.array([flow.surface_temperature for flow in self.flows])
+
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """The flows met on one side of the start, the folds among them, and why the side ends."""
+    """What is met on one side of the start, kinds (empty for a plain flow) with flows, and why the side ends."""
 
-    flows: list[MappedSolution]
-    folds: list[MappedSolution]
+    met: list[tuple[str, MappedSolution]]
     end: str
 
 
@@ -89,7 +115,18 @@ def mapped_curve(
         return MappedCurve((), (), (first.status.value, first.status.value))
     bounds = (float(np.log(low)), float(np.log(high)))
     hot, cold = (_side(first, direction, bounds, control) for direction in (1.0, -1.0))
-    return MappedCurve((*hot.flows[::-1], first, *cold.flows), (*hot.folds[::-1], *cold.folds), (hot.end, cold.end))
+    met = [*hot.met[::-1], ("", first), *cold.met]
+    flows = tuple(flow for kind, flow in met if not kind)
+    return MappedCurve(flows, tuple(_special(met)), (hot.end, cold.end))
+
+
+def _special(met: Sequence[tuple[str, MappedSolution]]) -> Iterator[MappedPoint]:
+    before = -1
+    for kind, flow in met:
+        if kind:
+            yield MappedPoint(kind, flow, before)
+        else:
+            before += 1
 
 
 def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: Control) -> _Side:
@@ -100,20 +137,37 @@ def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], 
     ahead = np.zeros(len(z))
     ahead[-2] = direction
     path = trace(system, z, direction=ahead, control=control)
-    side = _Side([], [], "")
-    previous: Point[MappedSystem] | None = None
+    met: list[tuple[str, MappedSolution]] = []
+    taken, previous = 0.0, None
     for point in path:
         if previous is not None and point.step > 0.0:
-            if point.tangent[-1] * previous.tangent[-1] < 0.0:
-                found = locate(previous, point, point.system, _flux_slope, control=control)
-                fold = _as_flow(found.point)
-                side.folds.append(replace(fold, status=Status.NO_CONVERGENCE) if found.status.failed else fold)
-            side.flows.append(_as_flow(point))
-            end = _reached(side.flows[-1], bounds)
-            if end:
-                return _Side(side.flows, side.folds, end)
+            special = list(_between(previous, point, control))
+            met += special
+            if special or point.arclength > taken + _SPACING:
+                taken = point.arclength
+                flow = _as_flow(point)
+                end = _unresolved(flow)
+                if end:
+                    return _Side(met, end)
+                met.append(("", flow))
+                end = _outside(flow, bounds)
+                if end:
+                    return _Side(met, end)
         previous = point
-    return _Side(side.flows, side.folds, path.status.value)
+    return _Side(met, path.status.value)
+
+
+def _between(
+    previous: Point[MappedSystem], point: Point[MappedSystem], control: Control
+) -> Iterator[tuple[str, MappedSolution]]:
+    """Kinds and flows of the special points of a step, as far as they are resolved."""
+    for kind, monitor in _MONITORS.items():
+        before, after = (monitor(p.z, p.tangent, p.system) for p in (previous, point))
+        if before * after < 0.0:
+            found = locate(previous, point, point.system, monitor, control=control)
+            flow = _as_flow(found.point)
+            if not found.status.failed and not _unresolved(flow):
+                yield kind, flow
 
 
 def _flux_slope(z: Array, tangent: Array, system: MappedSystem) -> float:
@@ -122,14 +176,28 @@ def _flux_slope(z: Array, tangent: Array, system: MappedSystem) -> float:
     return float(tangent[-1])
 
 
-def _reached(flow: MappedSolution, bounds: tuple[float, float]) -> str:
+def _density_excess(z: Array, tangent: Array, system: MappedSystem) -> float:
+    """Positive where the density is inverted."""
+    del tangent
+    return system.density_excess(z)
+
+
+_MONITORS: dict[str, Monitor[MappedSystem]] = {"fold-Q": _flux_slope, "density-inversion": _density_excess}
+
+
+def _unresolved(flow: MappedSolution) -> str:
+    """Why ``flow`` is not taken for one; empty where it is."""
+    if not np.isfinite(flow.error):
+        return Status.NO_CONVERGENCE.value
+    return "" if flow.error <= TOLERANCE else f"the series are not resolved with N = {LARGEST_DEGREE}"
+
+
+def _outside(flow: MappedSolution, bounds: tuple[float, float]) -> str:
     """Why a side ends at ``flow``; empty where it goes on."""
-    if not flow.macroscopic[LOG_T] < bounds[1]:
+    if flow.macroscopic[LOG_T] >= bounds[1]:
         return f"it goes on to surface temperatures above {np.exp(bounds[1]):g}"
-    if not flow.macroscopic[LOG_T] > bounds[0]:
+    if flow.macroscopic[LOG_T] <= bounds[0]:
         return f"it goes on to surface temperatures below {np.exp(bounds[0]):g}"
-    if flow.degree == LARGEST_DEGREE and flow.error > _DECAYED:
-        return f"the series are not resolved with N = {LARGEST_DEGREE}"
     return ""
 
 
@@ -140,7 +208,9 @@ def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
     along = gradient @ point.tangent
     along[LOG_H] = 0.0
     along /= np.linalg.norm(along)
-    w = along.tolist()
-    plane = Condition((w[LOG_Q], w[1], w[2], w[LOG_T]), float(along @ macroscopic))
+    plane = Condition((along[LOG_Q], 0.0, along[LOG_M], along[LOG_T]), float(along @ macroscopic))
     near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, Status.CONVERGED, point.iterations)
-    return solve_mapped(system.chute, near, plane, system.degree, multiple=system.multiple)
+    flow = solve_mapped(system.chute, near, plane, system.degree, multiple=system.multiple)
+    if flow.error <= TOLERANCE or system.degree == LARGEST_DEGREE:
+        return flow
+    return refine(system.chute, near, plane, TOLERANCE, multiple=system.multiple)

@@ -14,8 +14,9 @@ on p_S <= p <= p_S + M is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,11 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 _OFFSET = 0.2
 _UPPER, _PIECES, _DEGREE = 4.2, 200, 7
+
+#: The parameters of a chute that are numbers.
+PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
+#: Step along the imaginary axis of :func:`model_along`; its square is lost in rounding.
+IMAGINARY_STEP = 1e-20
 
 
 def _coordinate(x: Array) -> Array:
@@ -97,7 +103,7 @@ def _invert(density: Table, x: Array) -> Array:
     log_x = np.log(np.maximum(x, 1e-300))
     knots = _argument(np.linspace(1e-9, _UPPER, 400))
     (log_ratio, _), _ = density(_coordinate(knots))
-    log_scaled = np.interp(log_x, np.log(knots) + log_ratio, np.log(knots))
+    log_scaled = np.interp(log_x, np.log(knots) + log_ratio.real, np.log(knots))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
     for _ in range(4):
         scaled = np.exp(log_scaled)
@@ -108,19 +114,19 @@ def _invert(density: Table, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The steady problem of one chute: closures and boundary data, ready to evaluate."""
+    """The steady problem of one chute: closures and boundary data, ready to evaluate.
+
+    ``slope`` and ``roughness`` are those of the chute, but where one is moved along by :func:`model_along`.
+    """
 
     chute: Chute
+    slope: float
+    roughness: float
     table: Table
     surface_stress: float
     surface_flux: float
     base_loss: float
     slip_of_empty_base: float
-
-    @property
-    def slope(self) -> float:
-        """tan(theta)."""
-        return self.chute.slope
 
     def closures(self, x: Array) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
@@ -130,8 +136,7 @@ class Model:
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
-        chute = self.chute
-        return boundary.slip_coefficient(closures[SHEAR], closures[GRIP], chute.roughness, chute.slope)
+        return boundary.slip_coefficient(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
 
     def slip_slope(self, slopes: Array) -> Array:
         """Derivative of F1, given those of the closures: F1 is affine in them."""
@@ -145,11 +150,36 @@ class Model:
 @lru_cache(maxsize=256)
 def model(chute: Chute) -> Model:
     """The continuous problem of ``chute``."""
+    return _model(chute, _parameters(chute), closure_table(chute.closure, chute.restitution, chute.slope))
+
+
+def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
+    """The continuous problem with one ``parameter`` of ``chute`` at ``value``, and that an imaginary step further.
+
+    The imaginary parts of what the second model gives, over :data:`IMAGINARY_STEP`, are exact derivatives with
+    respect to the parameter (J. N. Lyness and C. B. Moler 1967, SIAM J. Numer. Anal. 4, 202-210). The value may
+    lie a little beyond what a chute allows. ``parameter`` is one of PARAMETERS.
+    """
+    at = _parameters(chute) | {parameter: value}
+    beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
+    stepped = closure_table(chute.closure, beyond["restitution"], beyond["slope"])
+    table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
+    return _model(chute, at, table), _model(chute, beyond, stepped)
+
+
+def _parameters(chute: Chute) -> dict[str, Any]:
+    return {name: getattr(chute, name) for name in PARAMETERS}
+
+
+def _model(chute: Chute, parameters: dict[str, Any], table: Table) -> Model:
+    slope, roughness = parameters["slope"], parameters["roughness"]
     return Model(
         chute=chute,
-        table=closure_table(chute.closure, chute.restitution, chute.slope),
+        slope=slope,
+        roughness=roughness,
+        table=table,
         surface_stress=boundary.surface_stress(chute.surface),
-        surface_flux=boundary.surface_flux(chute.surface, chute.slope),
-        base_loss=boundary.base_loss(chute.wall_restitution, chute.roughness),
-        slip_of_empty_base=float(boundary.slip_coefficient(np.zeros(()), np.zeros(()), chute.roughness, chute.slope)),
+        surface_flux=boundary.surface_flux(chute.surface, slope),
+        base_loss=boundary.base_loss(parameters["wall_restitution"], roughness),
+        slip_of_empty_base=np.asarray(boundary.slip_coefficient(np.zeros(()), np.zeros(()), roughness, slope)).item(),
     )

@@ -1,6 +1,8 @@
 """Boundary conditions of the fully developed flow: Richman's bumpy base and the two surfaces.
 
 # notation: r roughness, e_w wall restitution, s slope tan(theta), y = q/(p sqrt(T)).
+
+All parameters may be complex, so that a step along the imaginary axis gives exact derivatives.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ ROUGHNESS_RANGE = (0.5, math.sqrt(3.0) / 2.0)
 
 def kappa(roughness: float) -> float:
     """Geometry of the bumpy base, (2.11)."""
-    lid = math.sqrt(1.0 - roughness**2)
+    lid = (1.0 - roughness**2) ** 0.5
     return 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)
 
 
@@ -30,7 +32,7 @@ def slip_coefficient(shear: Field, grip: Field, roughness: float, slope: float) 
 
 def base_loss(wall_restitution: float, roughness: float) -> float:
     """Energy lost in collisions with the base over p sqrt(T), (2.15)."""
-    return math.sqrt(2.0 / math.pi) * 2.0 * (1.0 - wall_restitution) / (1.0 + math.sqrt(1.0 - roughness**2))
+    return math.sqrt(2.0 / math.pi) * 2.0 * (1.0 - wall_restitution) / (1.0 + (1.0 - roughness**2) ** 0.5)
 
 
 def surface_flux(surface: str, slope: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.paper.figures import FIGURES, figure
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, figure, method_note
 
 
 class Numbers(click.ParamType):
@@ -34,6 +36,10 @@ class Numbers(click.ParamType):
 _EPILOG = "Figures: " + "; ".join(f"{number}  {title}" for number, title in FIGURES.items())
 
 
+#: The help of the option.
+METHOD_HELP = "How flows are computed: overburden (this package's, the default) or mapped (the paper's own)."
+
+
 @click.command("figures", help=COMMANDS["figures"], epilog=_EPILOG)
 @options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
 @options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
@@ -43,29 +49,47 @@ _EPILOG = "Figures: " + "; ".join(f"{number}  {title}" for number, title in FIGU
     type=click.Choice(["png", "pdf", "svg"]),
     help="Format of the pictures; png by default.",
 )
-def command(only: list[int] | None, out: str | None, kind: str | None) -> None:
+@options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
+def command(only: list[int] | None, out: str | None, kind: str | None, method: str | None) -> None:
     """Compute, draw and write."""
-    folder = _directory(out or ".")
+    folder = directory(out or ".")
     chosen = only or list(FIGURES)
     names = {number: folder / f"figure_{number:02d}.{kind or 'png'}" for number in chosen}
     from chuteflow.faces.plots import write_figure
     from chuteflow.faces.writing import require_writable, written_beside
     from chuteflow.paper.data import csv_text
+    from chuteflow.paper.sources import source
 
     for path in names.values():
         require_writable(path, options.DRAWN)
+    flows = source(method or METHODS[0], workers())
     for number, path in names.items():
-        data = figure(number).compute()
+        begin = time.perf_counter()
+        data = computed(number, flows)
         write_figure(figure(number).draw(data), path)
         with written_beside(path.with_suffix(".csv")) as partial:
-            partial.write_text(csv_text(data), encoding="utf-8")
-        click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}")
+            partial.write_text(csv_text(data, method_note(number, flows)), encoding="utf-8")
+        unchanged = (
+            f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
+        )
+        took = f"{time.perf_counter() - begin:.1f} s"
+        click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}")
 
 
-def _directory(name: str) -> Path:
+def directory(name: str) -> Path:
+    """The directory of a name, made if need be.
+
+    Raises:
+        InputError: where it cannot be made.
+    """
     folder = Path(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
     return folder
+
+
+def workers() -> int:
+    """Processes that share the work where that pays: one for each core."""
+    return os.cpu_count() or 1

@@ -1,0 +1,63 @@
+"""The directive ``commands``: the help of every command, asked of the commands themselves."""
+
+from collections.abc import Iterator
+from importlib import import_module
+
+import click
+from docutils import nodes
+from package import FromPackage
+from sphinx.application import Sphinx
+
+from chuteflow.faces.cli import chuteflow as program
+
+
+class Commands(FromPackage):
+    """One section for each command."""
+
+    def run(self) -> list[nodes.Node]:
+        """The sections."""
+        self.note_package()
+        context = click.Context(program, info_name="chuteflow")
+        return [self._section(name, context) for name in program.list_commands(context)]
+
+    def _section(self, name: str, parent: click.Context) -> nodes.section:
+        command = import_module(f"chuteflow.faces.commands.{name}").command
+        context = click.Context(command, info_name=name, parent=parent)
+        title = f"chuteflow {name}"
+        section = nodes.section(ids=[f"chuteflow-{name}"], names=[title])
+        section += nodes.title(title, title)
+        section += nodes.paragraph(command.help, command.help)
+        usage = command.get_usage(context).removeprefix("Usage: ")
+        section += nodes.literal_block(usage, usage, language="text")
+        section += self._options(command, context)
+        for paragraph in (command.epilog or "").split("\n\n"):
+            section += _example(paragraph) if paragraph.startswith("Example: ") else nodes.paragraph("", paragraph)
+        return section
+
+    def _options(self, command: click.Command, context: click.Context) -> nodes.definition_list:
+        listed = nodes.definition_list()
+        for written, help_ in _records(command, context):
+            item, meaning = nodes.definition_list_item(), nodes.definition()
+            item += nodes.term("", "", nodes.literal(written, written))
+            meaning += nodes.paragraph(help_, help_)
+            item += meaning
+            listed += item
+        return listed
+
+
+def _records(command: click.Command, context: click.Context) -> Iterator[tuple[str, str]]:
+    for parameter in command.get_params(context):
+        record = parameter.get_help_record(context)
+        if record and "--help" not in parameter.opts:
+            yield record
+
+
+def _example(paragraph: str) -> nodes.literal_block:
+    line = paragraph.removeprefix("Example: ")
+    return nodes.literal_block(line, line, language="sh")
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directive."""
+    app.add_directive("commands", Commands)
+    return {"parallel_read_safe": True}

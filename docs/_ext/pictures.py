@@ -1,0 +1,78 @@
+"""Directives that draw at build: ``picture``, by a command line, and ``paper-figure``, by number.
+
+The pictures are part of the built site alone, and each stands below the command that makes it.
+"""
+
+import os
+import shlex
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+from docutils import nodes
+from package import FromPackage
+from sphinx.application import Sphinx
+
+from chuteflow.faces.cli import main
+from chuteflow.paper.captions import CAPTIONS
+from chuteflow.paper.figures import FIGURES
+
+
+class Picture(FromPackage):
+    """The command of the content, run, and the picture that it draws with --plot."""
+
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        """The command and the picture."""
+        command = " ".join(self.content)
+        words = shlex.split(command)
+        file = words[words.index("--plot") + 1]
+        return [_shown(command), self.drawn(words[1:], file, f"the picture that {command} draws")]
+
+    def drawn(self, arguments: list[str], file: str, alternative: str) -> nodes.image:
+        """The picture in ``file`` that the command of the arguments makes."""
+        self.note_package()
+        folder = Path(self.env.doctreedir).parent / ".pictures" / self.env.docname
+        folder.mkdir(parents=True, exist_ok=True)
+        before = Path.cwd()
+        os.chdir(folder)
+        try:
+            with redirect_stdout(StringIO()):
+                code = main(arguments)
+        finally:
+            os.chdir(before)
+        if code:
+            raise self.error(f"chuteflow {shlex.join(arguments)} ended with exit code {code}")
+        page = Path(self.env.doc2path(self.env.docname)).parent
+        return nodes.image(uri=Path(os.path.relpath(folder / file, page)).as_posix(), alt=alternative)
+
+
+class PaperFigure(Picture):
+    """A figure of the paper, recomputed, below its number and title."""
+
+    has_content = False
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Section, command, picture and caption."""
+        number = int(self.arguments[0])
+        title = f"Figure {number}: {FIGURES[number]}"
+        section = nodes.section(ids=[f"figure-{number}"], names=[title.lower()])
+        section += nodes.title(title, title)
+        command = f"chuteflow figures --only {number}"
+        section += _shown(command)
+        section += self.drawn(shlex.split(command)[1:], f"figure_{number:02d}.png", CAPTIONS[number])
+        section += nodes.paragraph(CAPTIONS[number], CAPTIONS[number])
+        return [section]
+
+
+def _shown(command: str) -> nodes.literal_block:
+    return nodes.literal_block(command, command, language="sh")
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directives; the working directory is that of the process, so pages are read one by one."""
+    app.add_directive("picture", Picture)
+    app.add_directive("paper-figure", PaperFigure)
+    return {"parallel_read_safe": False}

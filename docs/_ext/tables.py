@@ -1,0 +1,104 @@
+"""Directives that print tables of the package: quantities, closures, special points, claims."""
+
+from collections import Counter
+from collections.abc import Mapping
+
+from docutils import nodes
+from package import FromPackage
+from sphinx.application import Sphinx
+
+from chuteflow.analysis.results import KINDS
+from chuteflow.paper.claims import VERDICTS, check, shown
+from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity
+from chuteflow.theory.laws import LAWS
+
+#: What the exponents of a quantity's dimension belong to.
+_SCALES = (r"\rho_p", "d", r"(g\cos\theta)")
+
+
+class Quantities(FromPackage):
+    """The registry of quantities: ``numbers`` of a flow, or ``fields`` of a profile."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The table."""
+        self.note_package()
+        chosen: Mapping[str, Quantity] = {"numbers": NUMBERS, "fields": FIELDS}[self.arguments[0]]
+        rows = [
+            (f"`{q.name}`", f"`{q.symbol}`", f"${q.latex}$", scale(q), q.unit, q.description, q.equation)
+            for q in chosen.values()
+        ]
+        heading = ("attribute", "in JSON", "symbol", "scale", "SI", "meaning", "paper")
+        return [self.table(heading, rows, (20, 10, 8, 16, 8, 28, 10))]
+
+
+def scale(quantity: Quantity) -> str:
+    """What the quantity is scaled with, as a formula."""
+    powers = [
+        symbol if exponent == 1 else f"{symbol}^{{{_fraction(exponent)}}}"
+        for symbol, exponent in zip(_SCALES, quantity.dimension, strict=True)
+        if exponent
+    ]
+    return f"${' '.join(powers)}$" if powers else "1"
+
+
+def _fraction(exponent: float) -> str:
+    return f"{exponent:g}" if exponent == int(exponent) else f"{exponent * 2:g}/2"
+
+
+class Closures(FromPackage):
+    """The table of constitutive laws."""
+
+    def run(self) -> list[nodes.Node]:
+        """The table."""
+        self.note_package()
+        rows = [(f"`{law.name}`", law.description, law.source, f"{law.densest:g}") for law in LAWS.values()]
+        return [self.table(("name", "what", "source", r"$\nu^*$"), rows, (15, 50, 25, 10))]
+
+
+class SpecialPoints(FromPackage):
+    """The kinds of special points of a curve."""
+
+    def run(self) -> list[nodes.Node]:
+        """The table."""
+        self.note_package()
+        rows = [(f"`{kind}`", meaning) for kind, meaning in KINDS.items()]
+        return [self.table(("kind", "meaning"), rows, (30, 70))]
+
+
+class Claims(FromPackage):
+    """Every claim, computed now, with its verdict; a count of the verdicts first."""
+
+    def run(self) -> list[nodes.Node]:
+        """The sections."""
+        self.note_package()
+        found = list(check())
+        counted = Counter(verdict.verdict for verdict in found)
+        said = ", ".join(f"{counted[verdict]} {verdict}" for verdict in VERDICTS if counted[verdict])
+        rows = [
+            (claim.source, claim.statement, shown(claim.printed), shown(claim.computed), claim.verdict, claim.reason)
+            for claim in found
+        ]
+        group = [tuple(map(nodes.unescape, row)) for row in rows]
+        return [
+            nodes.paragraph("", f"{len(found)} claims: {said}."),
+            self.plain_table(("place", "statement", "printed", "computed", "verdict", "reason"), group),
+        ]
+
+    def plain_table(self, heading: tuple[str, ...], rows: list[tuple[str, ...]]) -> nodes.table:
+        """A table of plain text, in which nothing is markup."""
+        table = self.table(heading, [("",) * len(heading)] * len(rows), (8, 26, 13, 13, 10, 30))
+        entries = list(table.findall(nodes.entry))[len(heading) :]
+        for entry, text in zip(entries, (cell for row in rows for cell in row), strict=True):
+            entry.children = [nodes.paragraph(text, text)]
+        return table
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directives."""
+    app.add_directive("quantities", Quantities)
+    app.add_directive("closures", Closures)
+    app.add_directive("special-points", SpecialPoints)
+    app.add_directive("claims", Claims)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,1 @@
+"""Folds, onsets of density inversion and changes of interior, followed through a second parameter."""

@@ -1,0 +1,209 @@
+"""What flows a base has on a fan: how many, of which kinds, and in how many families.
+
+# notation: B the heat flux of a trajectory less that which the base gives, whose zeros are the flows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from contourpy import contour_generator
+
+from chuteflow.analysis.domains.fan import (
+    HEAT_FLUX,
+    LOG_GLIDE,
+    LOG_MASS,
+    LOG_SLIP,
+    NET_HIGH,
+    NET_LOW,
+    STEEPEST,
+    Base,
+    Fan,
+    lagrange,
+)
+from chuteflow.numerics.chebyshev import Array
+
+#: Bits of the kinds that are present among the flows of a chute.
+INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
+DENSITIES = {"monotonic": 1, "inverted": 2}
+#: Turns of ln Q along a family are told apart if they differ by more.
+_TURN = 1e-6
+#: Points of a family that lie nearer, in steps of the grid, say nothing more.
+_NEAR = 0.3
+#: Cubic interpolation is used where neighbouring steps of the grid differ by less than this factor.
+_EVEN = 12.0
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """The flows of one chute in the range searched.
+
+    ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux;
+    ``families`` the number of families (connected sets of flows); ``interior`` and ``density`` the bits of
+    INTERIORS and DENSITIES that are present.
+    """
+
+    at: tuple[bool, ...]
+    most: int
+    families: int
+    interior: int
+    density: int
+
+
+def kinds(fan: Fan, base: Base) -> Kinds:
+    """The kinds of the flows that ``base`` has on ``fan``."""
+    excess = fan.of_base(base)
+    at = _exists(excess[:, fan.place])
+    lines = [line for line in contour_generator(z=excess).lines(0.0) if len(line) > 1]
+    if not lines:
+        return Kinds(at, 0, 0, 0, 0)
+    chains = [_selected(np.asarray(line)) for line in lines]
+    fields = _at_zeros(fan, excess, np.concatenate(chains))
+    slip = np.maximum(fields[HEAT_FLUX] + base.loss, 0.0) / fan.slope
+    log_flux = np.logaddexp(fields[LOG_SLIP] + np.log(np.maximum(slip, 1e-300)), fields[LOG_GLIDE])
+    ends = np.cumsum([len(chain) for chain in chains])
+    pieces, interior, density = [], 0, 0
+    for first, last in zip(ends - [len(chain) for chain in chains], ends, strict=True):
+        part = slice(first, last)
+        pieces.append(_monotonic_pieces(fields[-1, part], fields[LOG_MASS, part], log_flux[part]))
+        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part])
+        density |= _densities(fields[STEEPEST, part])
+    return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
+
+
+def _exists(excess: Array) -> tuple[bool, ...]:
+    """Whether columns (K, T) have a zero, also between rows, where a parabola through three has one."""
+    positive = excess > 0.0
+    found = positive.any(axis=0) & ~positive.all(axis=0)
+    size = np.abs(excess)
+    before, here, after = size[:-2], size[1:-1], size[2:]
+    bend = before - 2.0 * here + after
+    dip = (here <= before) & (here <= after) & (bend > 0.0)
+    lowest = here - (after - before) ** 2 / (8.0 * np.where(dip, bend, 1.0))
+    return tuple((found | (dip & (lowest < 0.0)).any(axis=0)).tolist())
+
+
+def _selected(line: Array) -> Array:
+    """Of the vertices (k, 2) of a line in columns and rows, those on the edges that it crosses more squarely."""
+    ahead = np.empty_like(line)
+    ahead[1:-1] = line[2:] - line[:-2]
+    ahead[0], ahead[-1] = line[1] - line[0], line[-1] - line[-2]
+    on_column = line[:, 0] == np.rint(line[:, 0])
+    keep = on_column == (np.abs(ahead[:, 0]) >= 0.7 * np.abs(ahead[:, 1]))
+    keep[[0, -1]] = True
+    kept = line[keep]
+    while len(kept) > 3:
+        near = np.hypot(*np.diff(kept, axis=0).T) < _NEAR
+        near[1:] &= ~near[:-1]
+        drop = np.flatnonzero(near) + 1
+        drop = np.where(drop == len(kept) - 1, drop - 1, drop)
+        if not drop.size:
+            break
+        kept = np.delete(kept, drop, axis=0)
+    return kept
+
+
+def _at_zeros(fan: Fan, excess: Array, line: Array) -> Array:
+    """The fields of ``fan`` (7, k) at vertices (k, 2) on edges of the grid, and below them ln T (1, k).
+
+    The zero on an edge is that of the cubic through four values in line with it, where the grid is even enough.
+    """
+    column, row = np.floor(line).astype(np.intp).T
+    on_column = line[:, 0] == column
+    share = np.where(on_column, line[:, 1] - row, line[:, 0] - column)
+    _rows, columns = excess.shape
+    start = np.where(on_column, row, column)
+    # Of four values in line, where possible two to each side.
+    first = np.clip(start - 1, 0, np.where(on_column, fan.last[column], columns - 1) - 3)
+    aside = np.clip(start - first, 0, 2)
+    along = first + np.arange(4)[:, None]
+    r, c = np.where(on_column, along, row), np.where(on_column, column, along)
+    widths = np.where(on_column, np.diff(fan.log_mass[r, c], axis=0), fan.gaps[np.minimum(c[:3], columns - 2)])
+    here = np.arange(len(line))
+    unit = widths[aside, here]
+    even = (widths > unit / _EVEN).all(axis=0) & (widths < unit * _EVEN).all(axis=0) & (start - first == aside)
+    values = excess[r, c]
+    weights = np.zeros(values.shape)
+    weights[aside, here], weights[aside + 1, here] = 1.0 - share, share
+    if even.any():
+        at = np.concatenate([np.zeros((1, len(line))), np.cumsum(widths, axis=0)])[:, even] / unit[even]
+        low = at[aside[even], np.arange(at.shape[1])]
+        weights[:, even] = lagrange(at, _zero_of_cubic(at, values[:, even], low, low + share[even]))
+    fields = (fan.fields[:, r, c] * weights).sum(axis=1)
+    log_t = fan.spacing * np.append(0.0, np.cumsum(fan.gaps))
+    return np.concatenate([fields, [(log_t[c] * weights).sum(axis=0)]])
+
+
+def _zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
+    """Where between ``low`` and ``low`` + 1 the cubic through ``values`` (4, n) at ``at`` vanishes.
+
+    By regula falsi from ``x``; a cubic without change of sign there leaves it at an end.
+    """
+    high = low + 1.0
+    f_low, f_high = ((lagrange(at, end) * values).sum(axis=0) for end in (low, high))
+    for _ in range(3):
+        f = (lagrange(at, x) * values).sum(axis=0)
+        left = (f > 0.0) == (f_low > 0.0)
+        low, f_low = np.where(left, x, low), np.where(left, f, f_low)
+        high, f_high = np.where(left, high, x), np.where(left, f_high, f)
+        span = f_high - f_low
+        x = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
+    return x
+
+
+def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array) -> Array:
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q."""
+    from scipy.interpolate import CubicSpline
+
+    length = np.hypot(np.diff(log_t), np.diff(log_m))
+    keep = np.append(True, length > 1e-9)
+    log_q, at = log_q[keep], np.cumsum(np.append(0.0, length))[keep]
+    if len(at) > 3:
+        spline = CubicSpline(at, log_q)
+        turns = spline.derivative().roots(extrapolate=False)
+        stops = np.concatenate([log_q[:1], spline(turns[np.isfinite(turns)]), log_q[-1:]])
+    else:
+        stops = log_q
+    ends = np.stack([stops[:-1], stops[1:]], axis=1)
+    return np.sort(ends, axis=1)
+
+
+def _most(pieces: Array) -> int:
+    """The largest number of stretches (pieces, 2) over one point."""
+    low, high = pieces.T
+    edges = np.concatenate([low + _TURN, high])
+    order = np.lexsort((np.repeat([1, 0], len(low)), edges))
+    return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
+
+
+def _interiors(low: Array, high: Array) -> int:
+    found = 0
+    if _peak(low) >= 0.0:
+        found |= INTERIORS["dissipative"]
+    if _peak(-high) >= 0.0:
+        found |= INTERIORS["productive"]
+    if _peak(np.minimum(-low, high)) > 0.0:
+        found |= INTERIORS["mixed"]
+    return found
+
+
+def _densities(steepest: Array) -> int:
+    found = 0
+    if _peak(1.0 - steepest) >= 0.0:
+        found |= DENSITIES["monotonic"]
+    if _peak(steepest - 1.0) > 0.0:
+        found |= DENSITIES["inverted"]
+    return found
+
+
+def _peak(values: Array) -> float:
+    """The largest of values along a line, between points by parabolas."""
+    top = float(values.max())
+    i = int(values.argmax())
+    if 0 < i < len(values) - 1:
+        before, here, after = values[i - 1 : i + 2]
+        bend = 2.0 * here - before - after
+        if bend > 0.0:
+            top += float((after - before) ** 2 / (8.0 * bend))
+    return top

@@ -1,0 +1,148 @@
+"""A plane of two parameters of a chute, and what a point of it is classified by.
+
+Along one axis, ``inner``, points are cheap: where it is a parameter of the base, all points of a column share
+one fan of trajectories.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from chuteflow.analysis.domains.fan import Base, Fan, fan
+from chuteflow.analysis.domains.kinds import kinds
+from chuteflow.analysis.ranges import Range
+from chuteflow.errors import InputError
+from chuteflow.steady.chute import Chute
+from chuteflow.theory.boundary import ROUGHNESS_RANGE
+from chuteflow.theory.hot import dilute, hot_parameters
+from chuteflow.theory.laws import law
+
+#: The four parameters, as :class:`chuteflow.Chute` calls them; the last two are those of the base.
+PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
+_OF_BASE = PARAMETERS[2:]
+#: What a point is classified by, in the order of its code; after these come the temperatures asked for.
+CODES = ("hot", "most", "families", "interior", "density")
+#: Columns of surface temperature to a decade.
+_PER_DECADE = 12
+#: Bases between the ends of an axis, which bound what a fan has to serve.
+_BETWEEN = 5
+
+#: The class of a point: integers in the order of CODES, then 0 or 1 for each temperature.
+Code = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter from ``low`` to ``high``.
+
+    Raises:
+        InputError: for an unknown parameter or an empty range.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if self.name not in PARAMETERS:
+            raise InputError(f"unknown parameter {self.name!r}: choose one of {', '.join(PARAMETERS)}")
+        if self.name == "roughness":
+            # sqrt(3)/2 typed with a few digits rounds up.
+            top = ROUGHNESS_RANGE[1]
+            object.__setattr__(self, "high", top if top < self.high <= top + 5e-5 else self.high)
+        if not self.low < self.high:
+            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
+
+    def at(self, share: Any) -> Any:
+        """The value (or values) at a share of the range, 0 to 1."""
+        return self.low + (self.high - self.low) * share
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Two axes, and the values of all else.
+
+    ``chute`` has the fixed parameters, those of the axes at a value that does not matter; ``temperatures`` are
+    those at which flows are looked for; ``within`` is the range searched.
+
+    Raises:
+        InputError: for twice the same axis, or for a corner that is no chute.
+    """
+
+    x: Axis
+    y: Axis
+    chute: Chute
+    temperatures: tuple[float, ...]
+    within: Range = field(default_factory=lambda: Range.checked((1e-3, 1e5), 30.0))
+
+    def __post_init__(self) -> None:
+        if self.x.name == self.y.name:
+            raise InputError(f"both axes are {self.x.name}: give two parameters")
+        for x in (self.x.low, self.x.high):
+            for y in (self.y.low, self.y.high):
+                self.at(x, y)
+
+    def at(self, x: float, y: float) -> Chute:
+        """The chute at values of the two parameters."""
+        changed: dict[str, Any] = {self.x.name: float(x), self.y.name: float(y)}
+        return replace(self.chute, **changed)
+
+    @property
+    def transposed(self) -> bool:
+        """Whether the inner axis is ``x``: the first that is of the base, else ``y``."""
+        return self.y.name not in _OF_BASE and self.x.name in _OF_BASE
+
+    @property
+    def outer(self) -> Axis:
+        """The axis along which columns are placed."""
+        return self.y if self.transposed else self.x
+
+    @property
+    def inner(self) -> Axis:
+        """The axis along a column."""
+        return self.x if self.transposed else self.y
+
+    def chute_at(self, outer: float, inner: float) -> Chute:
+        """The chute at shares 0 to 1 of the outer and inner axis."""
+        u, v = float(self.outer.at(outer)), float(self.inner.at(inner))
+        return self.at(v, u) if self.transposed else self.at(u, v)
+
+
+def code(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of the point at shares of the outer and inner axis of ``plane``."""
+    chute = plane.chute_at(outer, inner)
+    found = kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
+    return (_hot(chute), found.most, found.families, found.interior, found.density, *map(int, found.at))
+
+
+def _neutral(plane: Plane) -> dict[str, Any]:
+    """Fixed values of those parameters that one fan serves all values of."""
+    return {axis.name: axis.low for axis in (plane.x, plane.y) if axis.name in _OF_BASE}
+
+
+@lru_cache(maxsize=4)
+def _fan(plane: Plane, chute: Chute) -> Fan:
+    """The fan of all points of ``plane`` whose grains and slope are those of ``chute``."""
+    served = [chute]
+    for axis in (plane.x, plane.y):
+        if axis.name in _OF_BASE:
+            shares = np.linspace(0.0, 1.0, _BETWEEN)
+            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
+    return fan(chute, [Base.of(base) for base in served], plane.within, np.array(plane.temperatures), _PER_DECADE)
+
+
+def _hot(chute: Chute) -> int:
+    """Whether there are hot flows: 1, 0, or -1 where the theory of section 4 does not say."""
+    if chute.surface != "free":
+        return -1
+    limit = _dilute(chute.closure, chute.restitution, chute.slope if law(chute.closure).knows_slope else 0.0)
+    return int(hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope).obstacle is None)
+
+
+@lru_cache(maxsize=64)
+def _dilute(closure: str, e: float, slope: float) -> Any:
+    return dilute(law(closure), e, slope)

@@ -1,0 +1,48 @@
+"""``chuteflow explore``: a page to try every parameter by hand."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import click
+
+from chuteflow.faces import options
+from chuteflow.faces.commands import COMMANDS
+
+#: Addresses that stand for all of this machine's, under names that cannot be known.
+_ANY = ("0.0.0.0", "::")
+
+
+@click.command("explore", help=COMMANDS["explore"])
+@click.option("--port", type=click.IntRange(0, 65535), help="Port; 8765 or another free one by default, 0 for any.")
+@options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, this machine alone, by default.")
+@click.option("--no-browser", is_flag=True, help="Do not open a browser.")
+def command(port: int | None, host: str | None, no_browser: bool) -> None:
+    """Serve until interrupted."""
+    import uvicorn
+
+    from chuteflow.faces.explorer.server import LOOPBACK, application, bound
+
+    address = host or "127.0.0.1"
+    listener = bound(address, port)
+    number = listener.getsockname()[1]
+    shown = f"[{address}]" if ":" in address else address
+    page = f"http://{shown}:{number}/"
+    hosts = LOOPBACK
+    if address not in LOOPBACK:
+        click.echo(f"chuteflow: anyone who reaches {address} can use this server", err=True)
+        hosts = None if address in _ANY else (*LOOPBACK, address)
+    click.echo(f"The explorer is at {page}   (Ctrl-C ends it)")
+    settings = uvicorn.Config(application(hosts), log_level="warning", lifespan="on", limit_concurrency=256)
+    if not no_browser:
+        _open_when_served(page)
+    with suppress(KeyboardInterrupt):  # the way to end it
+        uvicorn.Server(settings).run(sockets=[listener])
+
+
+def _open_when_served(page: str) -> None:
+    """The socket listens already, so that a browser opened now waits for the first answer."""
+    import threading
+    import webbrowser
+
+    threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()

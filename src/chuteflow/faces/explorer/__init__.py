@@ -1,0 +1,1 @@
+"""The explorer: one page, served on this machine, that answers while sliders move."""

@@ -1,0 +1,21 @@
+// SI units: each quantity scales with powers of the grain density, the grain diameter and g cos(theta).
+import { state } from "./state.js";
+
+let quantities = {};
+export function setQuantities(given) { quantities = given; }
+
+export function factor(symbol) {
+  if (!state.si) return 1;
+  const [a, b, c] = quantities[symbol].dimension;
+  return Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(state.slope))) ** c;
+}
+
+export function unit(symbol) {
+  const name = state.si ? quantities[symbol].unit : "1";
+  return name === "1" ? "" : name;
+}
+
+export function labelled(text, symbol) {
+  const name = unit(symbol);
+  return name ? `${text} (${name})` : text;
+}

@@ -1,0 +1,196 @@
+"""The server of the explorer: the page, its parts, and its questions handed to the lanes."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from chuteflow import __version__
+from chuteflow.errors import InputError
+from chuteflow.faces.explorer import queries
+from chuteflow.faces.explorer.answers import QUESTIONS, Answer
+from chuteflow.faces.explorer.lanes import Lane
+from chuteflow.steady.chute import SURFACES
+from chuteflow.steady.quantities import QUANTITIES
+from chuteflow.theory.laws import LAWS
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+#: Names of this machine that no other can reach it by.
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+PAGE = Path(__file__).parent / "page"
+#: Which lane answers what: quick ones never wait for slow ones.
+_LANES = {"flows": "quick", "curve": "curve", "export": "slow"}
+#: Seconds that one question may take in a lane.
+_LIMITS = {"quick": 10.0, "curve": 20.0, "slow": 60.0}
+_LONGEST_QUERY = 1000
+_HEADERS = {
+    b"content-security-policy": b"default-src 'self'; img-src 'self' data: blob:; style-src 'self'; "
+    b"frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    b"x-content-type-options": b"nosniff",
+    b"referrer-policy": b"no-referrer",
+    b"cache-control": b"no-cache",
+}
+
+
+class Guard:
+    """Refuses requests for another host, longer than any of ours, or that would change something."""
+
+    def __init__(self, app: ASGIApp, hosts: Sequence[str] | None) -> None:
+        self._app = app
+        self._hosts = hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let through or answer."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message["headers"], *_HEADERS.items()]
+            await send(message)
+
+        refusal = self._refusal(scope)
+        await (refusal or self._app)(scope, receive, send_guarded)
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        host = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"host"), "")
+        if self._hosts is not None and host_of(host) not in self._hosts:
+            return _error(400, f"host {host[:80]!r} is not served: ask for {' or '.join(self._hosts)}")
+        if scope["method"] not in ("GET", "HEAD"):
+            return _error(405, f"{scope['method'][:20]} is not served: GET alone")
+        if len(scope["query_string"]) > _LONGEST_QUERY:
+            return _error(414, f"the query is longer than {_LONGEST_QUERY} characters")
+        return None
+
+
+def host_of(header: str) -> str:
+    """The host of a Host header, without its port."""
+    name, colon, port = header.rpartition(":")
+    return (name if colon and port.isdigit() else header).strip("[]").lower()
+
+
+def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
+    """The application, for requests to one of ``hosts``, or to any for None."""
+    lanes = {name: Lane(limit) for name, limit in _LIMITS.items()}
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        first = {name: str(value) for name, value in queries.PRESETS[0].state.items()}
+        chute = {name: value for name, value in first.items() if name != "Q"}
+        warming = [
+            asyncio.ensure_future(lanes["quick"].ask("flows", first)),
+            asyncio.ensure_future(lanes["curve"].ask("curve", chute)),
+        ]
+        yield
+        for task in warming:
+            task.cancel()
+        for lane in lanes.values():
+            lane.close()
+
+    def asked(question: str) -> Callable[[Request], Any]:
+        async def respond(request: Request) -> Response:
+            names = [name for name, _ in request.query_params.multi_items()]
+            repeated = next((name for name in names if names.count(name) > 1), None)
+            if repeated is not None:
+                return _error(400, f"{repeated[:40]!r} is given several times: give it once")
+            return _response(await lanes[_LANES[question]].ask(question, request.query_params))
+
+        return respond
+
+    return Starlette(
+        routes=[
+            Route("/", _page),
+            Route("/about", _about),
+            *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS),
+            Mount("/page", StaticFiles(directory=PAGE)),
+        ],
+        middleware=[Middleware(Guard, hosts=hosts)],
+        exception_handlers={HTTPException: _refused, Exception: _failed},
+        lifespan=lifespan,
+    )
+
+
+def bound(host: str, port: int | None) -> socket.socket:
+    """A socket that listens at ``host``, at ``port`` or at 8765 or the next free one.
+
+    Raises:
+        InputError: where that is impossible.
+    """
+    wanted = [port] if port is not None else [8765, 0]
+    try:
+        family, *_, address = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0]
+    except (OSError, UnicodeError):
+        raise InputError(f"--host {host!r}: not an address of this machine, try 127.0.0.1") from None
+    problem = ""
+    for number in wanted:
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((address[0], number))
+            listener.listen(128)
+        except (OSError, OverflowError) as error:
+            listener.close()
+            problem = getattr(error, "strerror", None) or str(error)
+        else:
+            return listener
+    raise InputError(f"cannot listen at {host} port {wanted[0]}: {problem}; try --port 0 for any free one")
+
+
+async def _page(_: Request) -> Response:
+    return FileResponse(PAGE / "index.html")
+
+
+async def _about(_: Request) -> Response:
+    return JSONResponse(
+        {
+            "version": __version__,
+            "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
+            "presets": [{"title": preset.title, "state": dict(preset.state)} for preset in queries.PRESETS],
+            "surfaces": list(SURFACES),
+            "closures": list(LAWS),
+            "quantities": {
+                quantity.symbol: {
+                    "description": quantity.description,
+                    "unit": quantity.unit,
+                    "dimension": quantity.dimension,
+                }
+                for quantity in QUANTITIES.values()
+            },
+        }
+    )
+
+
+def _response(given: Answer) -> Response:
+    headers = {} if given.name is None else {"content-disposition": f'attachment; filename="{given.name}"'}
+    if given.status == 503:
+        headers["retry-after"] = "1"
+    return Response(given.body, status_code=given.status, media_type=given.media, headers=headers)
+
+
+def _error(status: int, what: str) -> Response:
+    return JSONResponse({"error": what}, status_code=status)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    return _error(status, f"{request.url.path[:80]!r}: {getattr(error, 'detail', 'failed')}")
+
+
+async def _failed(_: Request, __: Exception) -> Response:
+    return _error(500, "the server failed on this request")

@@ -1,0 +1,52 @@
+"""The continuous spectrum of a disturbed flow.
+
+# notation: as in chuteflow.theory.transport; lambda = 4 eta/3 + xi, the viscosity of compression.
+
+Density is only carried along, and waves that are short in z relax by viscosity: then (4 eta/3 + xi) w' balances
+the disturbance of the pressure, nu (dp/dnu) n, and (2.1) leaves at each height
+
+    sigma_c(z) = -i kx u(z) - nu (dp/dnu) / (4 eta/3 + xi).
+
+Far above the curve ends at -i kx u(infinity). It is not part of what a grid resolves: a grid shows some points
+of it, and no more of them are modes than there are unresolved densities.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from chuteflow.numerics.chebyshev import Array, grid
+from chuteflow.numerics.eigenproblem import Complex
+from chuteflow.stability.base import Base, Resolution, shares
+from chuteflow.theory.laws import law
+
+#: Points of the curve for each node of a grid.
+_FINENESS = 6
+
+
+def relaxation(flow_base: Base) -> tuple[Array, Array]:
+    """u and nu (dp/dnu)/(4 eta/3 + xi) on a grid several times as fine as that of ``flow_base``."""
+    resolution, flow = flow_base.resolution, flow_base.flow
+    fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
+    profile = flow.at_overburden(shares(grid(fine.degree).nodes, fine)[0])
+    nu, T = profile.volume_fraction, profile.granular_temperature
+    chute, chosen = flow.chute, law(flow.chute.closure)
+    g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
+    stiffness = (g.compressibility + nu * g.compressibility_slope) * T  # dp/dnu
+    viscosity = (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * np.sqrt(T)
+    return profile.velocity, nu * stiffness / viscosity
+
+
+def continuous_spectrum(flow_base: Base, kx: float) -> Complex:
+    """sigma_c(z) from far above down to the base, as points of a curve; it does not depend on ky."""
+    velocity, rate = relaxation(flow_base)
+    return -1j * kx * velocity - rate
+
+
+def distance(values: Complex, curve: Complex) -> Array:
+    """Distance of each of ``values`` (m,) to the polygon through the points of ``curve``."""
+    start, step = curve[:-1], np.diff(curve)
+    length = np.maximum(np.abs(step) ** 2, 1e-300)
+    off = values[:, None] - start
+    share = np.clip((off * step.conj()).real / length, 0.0, 1.0)
+    return np.abs(off - share * step).min(axis=1)

@@ -1,0 +1,226 @@
+"""Normal modes of a steady flow: computed twice, told from the continuous spectrum, each with its error.
+
+An eigenvalue of the coarse grid is a mode if
+
+- its density is resolved: the last coefficients of its Chebyshev series are small;
+- it comes back on a finer grid, with another map that reaches farther: the change is its error;
+- that change is a small part of its distance to the continuous spectrum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from chuteflow.errors import InputError, SolveError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
+from chuteflow.stability.base import Base, Resolution, base
+from chuteflow.stability.essential import distance, relaxation
+from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
+from chuteflow.steady.flow import Flow
+
+#: Degrees of the coarse and fine grids, tried in turn, and the weights of their maps.
+DEGREES = ((32, 44), (48, 64), (72, 96))
+_BETAS = (0.0, 1.0)
+#: How far the grids reach, in ln p, for wavenumbers down to _LONG, and how much farther the fine one does.
+_REACH, _FARTHER, _LONG = 14.0, 2.0, 1e-3
+#: Largest share of the last coefficients of a resolved density.
+_TAIL = 0.03
+#: Largest share that the change between grids may have in the distance to the continuous spectrum.
+_DRIFT = 1e-3
+#: Absolute error of a growth rate that is asked for, unless told otherwise.
+TOLERANCE = 1e-6
+#: Largest wavenumber, in 1/d: shorter waves than a tenth of a grain have no meaning.
+_LARGEST = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """A disturbance exp(``sigma`` t + i (kx x + ky y)) of ``flow``; ``error`` is the estimated one of sigma.
+
+    Rates are in sqrt(g cos(theta)/d), wavenumbers in 1/d.
+    """
+
+    flow: Flow
+    kx: float
+    ky: float
+    sigma: complex
+    error: float
+    operator: Operator
+    vector: Complex
+
+    @property
+    def growth(self) -> float:
+        """Growth rate, negative where the disturbance decays."""
+        return self.sigma.real
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency: crests go as exp(i (kx x + ky y - frequency t))."""
+        return -self.sigma.imag
+
+    @property
+    def speed(self) -> float | None:
+        """Speed of the crests down the slope; None for disturbances that do not vary along it."""
+        return self.frequency / self.kx if self.kx else None
+
+    @property
+    def direction(self) -> str:
+        """ "uniform", "along" the slope, "across" it or "oblique", by the wavenumbers."""
+        if self.kx == 0.0 and self.ky == 0.0:
+            return "uniform"
+        if self.ky == 0.0:
+            return "along"
+        return "across" if self.kx == 0.0 else "oblique"
+
+    @cached_property
+    def height(self) -> Array:
+        """Heights at which the fields of :meth:`fields` are given, from far above down to the base."""
+        return self.operator.base.profile.height
+
+    @cached_property
+    def fields(self) -> Complex:
+        """nu', u, v, w and T' at :attr:`height`, (5, n): the largest of u, v, w is 1, and real."""
+        profile = self.operator.base.profile
+        relative = relative_fields(self.operator, self.vector)
+        out = relative.copy()
+        out[0] *= profile.volume_fraction
+        out[-1] *= profile.granular_temperature
+        velocity = out[ALONG:-1]
+        return out / velocity.ravel()[np.abs(velocity).argmax()]
+
+
+def relative_fields(of: Operator, vector: Complex) -> Complex:
+    """n = nu'/nu, u, v, w and tau = T'/T at the nodes, (5, n), from the unknowns."""
+    fields = vector.reshape(FIELDS, -1).copy()
+    fields[DENSITY] = without_top(of.base) @ fields[DENSITY]
+    return fields
+
+
+class Disturbances:
+    """All small disturbances of one flow; grids are made when they are wanted, and kept.
+
+    Raises:
+        InputError: where stability cannot be posed, see :func:`chuteflow.stability.linear.grains`.
+    """
+
+    def __init__(self, flow: Flow) -> None:
+        self.flow = flow
+        self._operators: dict[Resolution, Operator] = {}
+        self._rates: dict[Resolution, tuple[Array, Array]] = {}
+
+    def modes(self, kx: float, ky: float, *, count: int = 1, tolerance: float = TOLERANCE) -> list[Mode]:
+        """Up to ``count`` modes at wavenumbers ``kx`` along and ``ky`` across the slope, fastest growing first.
+
+        Grids are refined until the first of them is known to ``tolerance``. Where the continuous spectrum
+        hides all modes, there are none.
+
+        Raises:
+            InputError: for wavenumbers out of range.
+            SolveError: where the finest grids do not reach the tolerance.
+        """
+        check_wavenumbers(kx, ky)
+        error = np.inf
+        for level in range(len(DEGREES)):
+            found = self._accepted(kx, ky, level, count)
+            if found and (error := found[0].error) <= tolerance:
+                return found
+            if not found and level:
+                return []
+        raise SolveError(
+            f"the leading mode at kx = {kx:g}, ky = {ky:g} is known to {error:.1e} at best, not to {tolerance:g}: "
+            "ask for a larger tolerance"
+        )
+
+    def candidates(self, kx: float, ky: float, level: int = 0) -> Complex:
+        """Eigenvalues of the coarse grid that may be modes, fastest growing first; not yet checked on another."""
+        resolution = self._resolutions(kx, ky, level)[0]
+        of = self.operator(resolution)
+        curve = self._curve(resolution, kx)
+        end = curve[0]
+        # To the right of everything that matters, in the middle of the range of speeds.
+        shift = complex(0.05 * (1.0 + abs(kx)), 0.5 * (end.imag + curve[-1].imag))
+        found = spectrum(of.matrix(kx, ky), of.weights, shift)
+        kept = (density_tail(of, found.vectors) < _TAIL) & (np.abs(found.values - end) > 3.0 * abs(end.real))
+        if kx == 0.0 and ky == 0.0:
+            kept |= np.abs(found.values) < 1e-10
+        values = found.values[kept]
+        return values[np.argsort(-values.real)]
+
+    def checked(self, kx: float, ky: float, candidate: complex, level: int = 0) -> Mode | None:
+        """The mode on the fine grid that ``candidate`` of the coarse one stands for, or None if there is none."""
+        coarse, fine = self._resolutions(kx, ky, level)
+        of = self.operator(fine)
+        sigma, vector = refined(of.matrix(kx, ky), of.weights, candidate)
+        error = abs(sigma - candidate)
+        away = distance(np.array([sigma]), self._curve(coarse, kx))[0]
+        if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
+            return None
+        # Rounding leaves this much of a rate, whatever the grids say.
+        noise = 1e-14 * (1.0 + abs(sigma))
+        return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector)
+
+    def operator(self, resolution: Resolution) -> Operator:
+        """The operator on one grid."""
+        if resolution not in self._operators:
+            self._operators[resolution] = operator(base(self.flow, resolution))
+        return self._operators[resolution]
+
+    def continuous(self, kx: float) -> Complex:
+        """Points of the continuous spectrum, from far above down to the base."""
+        return self._curve(self._resolutions(kx, 0.0, 0)[0], kx)
+
+    def _accepted(self, kx: float, ky: float, level: int, count: int) -> list[Mode]:
+        found: list[Mode] = []
+        for candidate in self.candidates(kx, ky, level):
+            mode = self.checked(kx, ky, complex(candidate), level)
+            if mode is not None:
+                found.append(mode)
+            if len(found) == count:
+                break
+        return found
+
+    def _resolutions(self, kx: float, ky: float, level: int) -> tuple[Resolution, Resolution]:
+        # Far above, where nu is below k, stresses change from those of inertia to those of viscosity.
+        k = float(np.hypot(kx, ky))
+        decades = np.ceil(np.log10(_LONG / k)) if 0.0 < k < _LONG else 0.0
+        farther = float(np.log(10.0) * decades)
+        degrees = (round(degree * (1.0 + farther / _REACH)) for degree in DEGREES[level])
+        coarse, fine = (
+            Resolution(degree, _REACH + farther + more, beta)
+            for degree, more, beta in zip(degrees, (0.0, _FARTHER), _BETAS, strict=True)
+        )
+        return coarse, fine
+
+    def _curve(self, resolution: Resolution, kx: float) -> Complex:
+        if resolution not in self._rates:
+            self._rates[resolution] = relaxation(self._base(resolution))
+        velocity, rate = self._rates[resolution]
+        return -1j * kx * velocity - rate
+
+    def _base(self, resolution: Resolution) -> Base:
+        return self.operator(resolution).base
+
+
+def density_tail(of: Operator, vectors: Complex) -> Array:
+    """Relative size of the last sixth of the Chebyshev coefficients of the density of each of ``vectors``."""
+    density = without_top(of.base) @ vectors[: of.points]
+    coefficients = np.abs(of.base.grid.to_coefficients @ density)
+    return coefficients[-(of.points // 6) :].max(axis=0) / coefficients.max(axis=0)
+
+
+def check_wavenumbers(kx: float, ky: float) -> None:
+    """Check wavenumbers.
+
+    Raises:
+        InputError: where they are no finite numbers in the range that has a meaning.
+    """
+    for name, k in (("kx", kx), ("ky", ky)):
+        if not (np.isfinite(k) and abs(k) <= _LARGEST):
+            raise InputError(f"wavenumber {name} = {k}: must be from -{_LARGEST:g} to {_LARGEST:g} (in 1/d)")
+    k = np.hypot(kx, ky)
+    if 0.0 < k < 1e-9:
+        raise InputError(f"wavenumber {k:g}: must be 0 or at least 1e-9 (in 1/d)")

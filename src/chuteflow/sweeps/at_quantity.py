@@ -1,0 +1,370 @@
+"""Every flow of many chutes at a given flux, hold-up or centre of mass.
+
+# notation: column the trajectory of one chute from one surface temperature; its flows are counted from the
+# surface down.
+
+The flows of one surface temperature alternate in the sign with which the heat flux passes that of the base, so that
+the k-th of one column goes over into the k-th of the next, unless two have met between them or one has left to
+large hold-ups. Columns are put where that is so, or where the quantity turns, near the value asked for, until
+every flow lies between two columns whose flows are known to go over into each other; there it is found as the
+zero of one function of the surface temperature.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.sweeps.bases import FLOOR, LADDER, SAFETY, Flows, flows_on, meets_base
+from chuteflow.sweeps.batch import Batch, Indices
+from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
+from chuteflow.sweeps.zeros import zeros
+
+#: Columns per decade of surface temperature to begin with.
+_PER_DECADE = 4
+#: Accuracy of the columns, and for those whose first flow lies above the start.
+_ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
+#: Flows kept of a column; a chute with more is left to the search by families.
+_MOST = 12
+#: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
+_APART, _BY_TEMPERATURE = 0.3, 2.0
+#: Rounds of new columns, and the closest two columns.
+_ROUNDS, _CLOSEST = 60, 1e-12
+#: Columns reach to hold-ups a little beyond those asked for, so that no flow lies beside the last one.
+_BEYOND = 1.1
+#: Where two flows meet, the value there lies within this many of their distances, and a little.
+_ASIDE, _LITTLE = 1.0, 1e-3
+#: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
+_NEAR, _MOST_STEPS = 1e-7, 6
+#: A flow meets the value asked for to this.
+_MEETS = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns in order of lanes and temperature: ``lane`` and ``log_t`` (c,), how many flows each has (c,), -1 where
+    that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
+
+    lane: Indices
+    log_t: Array
+    count: Indices
+    flows: Array
+
+    def joined(self, other: Columns) -> Columns:
+        """Both in order."""
+        parts = [np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)]
+        order = np.lexsort((parts[1], parts[0]))
+        return Columns(*(part[order] for part in parts))
+
+    def of(self, lanes: NDArray[np.bool_]) -> Columns:
+        """The columns of some lanes."""
+        keep = lanes[self.lane]
+        return Columns(*(part[keep] for part in vars(self).values()))
+
+
+@dataclass(frozen=True, eq=False)
+class Brackets:
+    """Flows that lie between two columns: ``lane``, ``place`` among the flows from the surface, ends in ln T and the
+    ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
+
+    lane: Indices
+    place: Indices
+    low: Array
+    high: Array
+    f_low: Array
+    f_high: Array
+    log_m: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The chutes, the quantity asked for by its place in the macroscopic ones, ln of its values (n,), and the ends of
+    the lanes."""
+
+    batch: Batch
+    which: int
+    target: Array
+    ends: Ends
+    deepest: Array
+
+    def columns(self, lane: Indices, log_t: Array) -> Columns:
+        """Rough columns of ``lane`` (c,) at ``log_t`` (c,)."""
+        found, trouble = self._marched(lane, log_t, _ROUGH)
+        again = np.flatnonzero(trouble)
+        if again.size:
+            thin, still = self._marched(lane[again], log_t[again], _THIN)
+            found = Flows.joined(
+                [found.take(~trouble[found.lane]), Flows(again[thin.lane], *list(vars(thin).values())[1:])]
+            )
+            trouble[again] = still
+        found = found.take(np.lexsort((found.macroscopic[LOG_M], found.lane)))
+        count = np.bincount(found.lane, minlength=lane.size)
+        place = np.arange(found.lane.size) - (np.cumsum(count) - count)[found.lane]
+        kept = place < _MOST
+        flows = np.full((lane.size, _MOST, 3), np.nan)
+        flows[found.lane[kept], place[kept]] = found.macroscopic[:LOG_T, kept].T
+        count[trouble | (count > _MOST)] = -1
+        return Columns(lane, log_t, count, flows)
+
+    def _marched(self, lane: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
+        some, temperature = self.batch.take(lane), np.exp(log_t)
+        found = march(some, temperature, self.ends.take(lane), accuracy, meets_base)
+        return flows_on(some, temperature, found), found.trouble
+
+
+def at_quantity(
+    batch: Batch,
+    which: int,
+    value: Array,
+    surface_temperature: tuple[float, float],
+    largest_holdup: float,
+    tolerance: float,
+) -> tuple[Flows, NDArray[np.bool_]]:
+    """Every flow with surface temperature and hold-up in the range at which the quantity ``which`` has the values
+    (n,), and the lanes (n,) that could not be settled to ``tolerance``, which have none of those returned."""
+    target = np.log(value)
+    holdups = np.full(len(batch), largest_holdup)
+    if which == LOG_M:
+        holdups = np.maximum(holdups, value)
+    deepest = _BEYOND * holdups + batch.surface_stress
+    problem = Problem(batch, which, target, Ends.of(batch, deepest), np.log(holdups))
+    low, high = np.log(surface_temperature)
+    many = max(int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE)), 2) + 1
+    lanes = np.arange(len(batch))
+    columns = problem.columns(np.repeat(lanes, many), np.tile(np.linspace(low, high, many), len(batch)))
+    unsettled = np.zeros(len(batch), dtype=bool)
+    brackets: list[Brackets] = []
+    for _ in range(_ROUNDS):
+        unsettled[columns.lane[columns.count < 0]] = True
+        columns = columns.of(~unsettled)
+        found, split = _links(problem, columns)
+        gap = columns.log_t[split + 1] - columns.log_t[split]
+        unsettled[columns.lane[split[gap < _CLOSEST]]] = True
+        split = split[gap >= _CLOSEST]
+        # A lane is done when none of its gaps is split.
+        ready = np.ones(len(batch), dtype=bool)
+        ready[columns.lane[split]] = False
+        ready &= ~unsettled
+        brackets.append(_chosen(found, ready))
+        columns = columns.of(~ready & ~unsettled)
+        if not columns.lane.size:
+            break
+        _, split = _links(problem, columns)
+        gap = columns.log_t[split + 1] - columns.log_t[split]
+        middle = columns.log_t[split] + 0.5 * gap
+        columns = columns.joined(problem.columns(columns.lane[split], middle))
+    unsettled[columns.lane] = True
+    whole = Brackets(*(np.concatenate(part) for part in zip(*(vars(b).values() for b in brackets), strict=True)))
+    flows, failed = _found(problem, whole, tolerance)
+    unsettled |= failed
+    inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.lane]) & ~unsettled[flows.lane]
+    return Flows.joined([flows.take(inside)]), unsettled
+
+
+def _chosen(brackets: Brackets, lanes: NDArray[np.bool_]) -> Brackets:
+    keep = lanes[brackets.lane]
+    return Brackets(*(part[keep] for part in vars(brackets).values()))
+
+
+def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
+    """The flows that lie between columns that go over into each other, and the columns after which there is a gap that
+    may hide more, and wants a column."""
+    left = np.flatnonzero(columns.lane[1:] == columns.lane[:-1])
+    right = left + 1
+    lane = columns.lane[left]
+    a, b = columns.flows[left], columns.flows[right]
+    n_a, n_b = columns.count[left], columns.count[right]
+    apart = _APART + _BY_TEMPERATURE * (columns.log_t[right] - columns.log_t[left])
+    deepest = problem.deepest[lane]
+    # From the surface down the flows go over into each other, up to the first that does not.
+    alike = (np.abs(a - b) <= apart[:, None, None]).all(axis=-1)
+    first = np.cumprod(alike, axis=1).sum(axis=1)
+    off_a = a[..., problem.which] - problem.target[lane, None]
+    off_b = b[..., problem.which] - problem.target[lane, None]
+    place = np.arange(_MOST)
+    linked = place < first[:, None]
+    crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
+    split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, apart, deepest)
+    split |= _turning(columns, left, linked, off_a, off_b)
+    rows, places = np.nonzero(crossing)
+    log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
+    found = Brackets(
+        lane[rows],
+        places,
+        columns.log_t[left[rows]],
+        columns.log_t[right[rows]],
+        off_a[rows, places],
+        off_b[rows, places],
+        log_m,
+    )
+    return found, left[split]
+
+
+def _unlinked(
+    a: Array,
+    b: Array,
+    off_a: Array,
+    off_b: Array,
+    n_a: Indices,
+    n_b: Indices,
+    first: Indices,
+    apart: Array,
+    deepest: Array,
+) -> NDArray[np.bool_]:
+    """Where flows of neighbouring columns that do not go over into each other may hide the value asked for."""
+    place = np.arange(_MOST)
+    # From below, flows may go over into each other with other places.
+    last = np.zeros_like(first)
+    rows = np.arange(len(first))
+    alive = (n_a - n_b) % 2 == 0
+    alive &= (n_a != n_b) | (first < n_a)
+    hidden = np.zeros(len(first), dtype=bool)
+    for j in range(1, _MOST + 1):
+        alive = alive & (n_a - j >= first) & (n_b - j >= first)
+        i_a, i_b = np.maximum(n_a - j, 0), np.maximum(n_b - j, 0)
+        alive &= (np.abs(a[rows, i_a] - b[rows, i_b]) <= apart[:, None]).all(axis=-1)
+        if not alive.any():
+            break
+        last += alive
+        hidden |= alive & ((off_a[rows, i_a] > 0.0) != (off_b[rows, i_b] > 0.0))
+    for flows, off, count in ((a, off_a, n_a), (b, off_b, n_b)):
+        loose = (place >= first[:, None]) & (place < (count - last)[:, None])
+        loose &= flows[..., LOG_M] <= deepest[:, None]
+        any_loose = loose.any(axis=1)
+        low = np.where(loose, off, np.inf).min(axis=1)
+        high = np.where(loose, off, -np.inf).max(axis=1)
+        # An even number of them have met in pairs; of an odd number the last has left to larger hold-ups.
+        paired = (loose.sum(axis=1) % 2 == 0) & (n_a != n_b)
+        with np.errstate(invalid="ignore"):
+            aside = np.where(paired, _ASIDE * (high - low) + _LITTLE, np.inf)
+            hidden |= any_loose & (low - np.minimum(aside, apart) <= 0.0) & (high + aside >= 0.0)
+    return hidden
+
+
+def _turning(
+    columns: Columns, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
+) -> NDArray[np.bool_]:
+    """Where the quantity turns along a family so near to its value that it may pass it between the columns."""
+    out = np.zeros(len(left), dtype=bool)
+    # Pairs of gaps with a column between them.
+    one = np.flatnonzero(left[1:] == left[:-1] + 1)
+    two = one + 1
+    f0, f1, f2 = off_a[one], off_a[two], off_b[two]
+    s0 = (columns.log_t[left[one]] - columns.log_t[left[two]])[:, None]
+    s2 = (columns.log_t[left[two] + 1] - columns.log_t[left[two]])[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        same = ((f0 > 0.0) == (f1 > 0.0)) & ((f1 > 0.0) == (f2 > 0.0)) & linked[one] & linked[two]
+        nearest = (np.abs(f1) <= np.abs(f0)) & (np.abs(f1) <= np.abs(f2))
+        bend = ((f2 - f1) / s2 - (f1 - f0) / (-s0)) / (s2 - s0)
+        slope = (f2 - f1) / s2 - bend * s2
+        sag = slope**2 / (4.0 * np.abs(bend))
+        # The parabola is trusted no further than to its own size.
+        near = same & nearest & (np.abs(f1) <= 2.0 * sag + 0.05 * np.abs(bend) * np.maximum(s0**2, s2**2))
+    turning = near.any(axis=1)
+    out[one[turning]] = True
+    out[two[turning]] = True
+    return out
+
+
+def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
+    """The flows in the brackets, and the lanes on which one could not be found to ``tolerance``."""
+    failed = np.zeros(len(problem.batch), dtype=bool)
+    near = Near(problem, brackets)
+    log_t, slope = near.rough()
+    pending = np.arange(brackets.lane.size)
+    flows: list[Flows] = []
+    for coarser, finer in itertools.pairwise(LADDER):
+        good = np.isfinite(log_t[pending])
+        failed[brackets.lane[pending[~good]]] = True
+        pending = pending[good]
+        if not pending.size:
+            break
+        log_t[pending], slope[pending], here = near.polished(pending, log_t[pending], slope[pending], coarser)
+        there = near.at(pending, log_t[pending], finer)
+        # What changes at a given surface temperature is carried over to the given quantity.
+        change = there.macroscopic[:LOG_T] - here[:LOG_T]
+        off = there.macroscopic[problem.which] - problem.target[brackets.lane[pending]]
+        carried = np.abs(change - near.gradient(pending) * (change[problem.which] / slope[pending]))
+        rest = np.abs(near.gradient(pending) * (off - change[problem.which]) / slope[pending])
+        error = np.maximum(SAFETY * (carried + rest).max(axis=0), FLOOR)
+        moved = there.macroscopic.copy()
+        moved[:LOG_T] -= near.gradient(pending) * (off / slope[pending])
+        moved[LOG_T] -= off / slope[pending]
+        lane = brackets.lane[pending]
+        done = error <= tolerance
+        flows.append(Flows(lane, np.exp(moved[LOG_T]), there.state, moved, error).take(done))
+        pending = pending[~done]
+    failed[brackets.lane[pending]] = True
+    return Flows.joined(flows), failed
+
+
+class Near:
+    """Flows near surface temperatures inside their brackets."""
+
+    def __init__(self, problem: Problem, brackets: Brackets) -> None:
+        self._problem, self._brackets = problem, brackets
+        self._batch = problem.batch.take(brackets.lane)
+        ends = problem.ends.take(brackets.lane)
+        # A little below the flow is deep enough.
+        deepest = np.minimum(ends.deepest, problem.batch.surface_stress + 1.5 * np.exp(brackets.log_m))
+        self._ends = Ends(deepest, ends.floor, ends.ceiling, ends.turn, ends.rate)
+        self._target = problem.target[brackets.lane]
+        self._gradient = np.zeros((3, brackets.lane.size))
+
+    def gradient(self, which: Indices) -> Array:
+        """d (ln Q, ln h, ln M)/d ln T_surface along the family, (3, m)."""
+        return self._gradient[:, which]
+
+    def at(self, which: Indices, log_t: Array, accuracy: Accuracy) -> Flows:
+        """The flows ``which`` (m,) at ``log_t`` (m,), one each; NaN where it is not there."""
+        some, temperature = self._batch.take(which), np.exp(log_t)
+        found = march(some, temperature, self._ends.take(which), accuracy, meets_base)
+        count = np.bincount(found.lane, minlength=which.size)
+        index = (np.cumsum(count) - count) + self._brackets.place[which]
+        there = (self._brackets.place[which] < count) & ~found.trouble
+        safe = np.minimum(index, max(found.lane.size - 1, 0))
+        state = np.full((found.state.shape[0], which.size), np.nan)
+        state[:, there] = found.state[:, safe[there]]
+        with np.errstate(invalid="ignore"):
+            return flows_on(some, temperature, Found(np.arange(which.size), state, found.trouble))
+
+    def rough(self) -> tuple[Array, Array]:
+        """ln T of the flows by rough columns, and the slope of the quantity's logarithm over it in the bracket."""
+        b = self._brackets
+
+        def off(which: Indices, log_t: Array) -> Array:
+            return self.at(which, log_t, _POLISH).macroscopic[self._problem.which] - self._target[which]
+
+        slope = (b.f_high - b.f_low) / (b.high - b.low)
+        return zeros(off, b.low, b.high, b.f_low, b.f_high, _NEAR, _NEAR), slope
+
+    def polished(self, which: Indices, log_t: Array, slope: Array, accuracy: Accuracy) -> tuple[Array, Array, Array]:
+        """ln T where the quantity has its value, the slope there, and (ln Q, ln h, ln M, ln T) (4, m): by secants."""
+        quantity = self._problem.which
+        here = self.at(which, log_t, accuracy).macroscopic
+        off = here[quantity] - self._target[which]
+        # The first step tells the slope; it must not be lost in rounding.
+        step = np.where(np.abs(off) > 1e-9, -off / slope, 1e-6)
+        for _ in range(_MOST_STEPS):
+            step = np.clip(step, -0.05, 0.05)
+            there = self.at(which, log_t + step, accuracy).macroscopic
+            gained = there[:LOG_T] - here[:LOG_T]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                self._gradient[:, which] = np.where(step != 0.0, gained / step, self._gradient[:, which])
+                slope = np.where(step != 0.0, gained[quantity] / step, slope)
+            log_t, here = log_t + step, there
+            off = here[quantity] - self._target[which]
+            if not (np.abs(off) > _MEETS).any():
+                break
+            with np.errstate(invalid="ignore", divide="ignore"):
+                step = np.where(np.abs(off) > _MEETS, -off / slope, 0.0)
+        return log_t, slope, here
+
+
+#: Accuracy of the columns between which a zero is sought.
+_POLISH = Accuracy(1e-7, 2e-3)

@@ -1,0 +1,130 @@
+"""Every flow of many chutes at given surface temperatures, each with its error.
+
+A trajectory from the surface knows nothing of the base, and every flow of its surface temperature is a point of
+it (:mod:`chuteflow.sweeps.marching`). All lanes are integrated once, and those with flows again with smaller
+tolerances, until what changes is small enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
+from chuteflow.sweeps.batch import GLIDE, LOG_P, MOMENT, ROWS, Along, Batch, Indices
+from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
+
+#: Accuracies, one after the other: a lane goes on to the next until its flows are settled.
+LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Accuracy(1e-12, 1e-8))
+#: The error claimed is this many times the change from one accuracy to the next.
+SAFETY = 2.0
+#: Least error ever claimed.
+FLOOR = 1e-12
+#: The finer integrations end a little below the last flow.
+_BELOW = 1.02
+
+
+@dataclass(frozen=True, eq=False)
+class Flows:
+    """Flows of a batch: the ``lane`` (k,) of each, its ``temperature`` at the surface and ``state`` (ROWS, k) at the
+    base, the logarithms ``macroscopic`` (4, k) of Q, h, M and T_surface, and its relative ``error``."""
+
+    lane: Indices
+    temperature: Array
+    state: Array
+    macroscopic: Array
+    error: Array
+
+    def take(self, which: NDArray[np.bool_] | Indices) -> Flows:
+        """The flows ``which``."""
+        return Flows(
+            self.lane[which],
+            self.temperature[which],
+            self.state[:, which],
+            self.macroscopic[:, which],
+            self.error[which],
+        )
+
+    @classmethod
+    def joined(cls, parts: list[Flows]) -> Flows:
+        """All flows, in order of lanes, from hot to cold, then by hold-up."""
+        whole = cls(
+            np.concatenate([np.empty(0, dtype=np.intp), *(p.lane for p in parts)]),
+            np.concatenate([np.empty(0), *(p.temperature for p in parts)]),
+            np.concatenate([np.empty((ROWS, 0)), *(p.state for p in parts)], axis=1),
+            np.concatenate([np.empty((4, 0)), *(p.macroscopic for p in parts)], axis=1),
+            np.concatenate([np.empty(0), *(p.error for p in parts)]),
+        )
+        order = np.lexsort((whole.macroscopic[LOG_M], -whole.temperature, whole.lane))
+        return whole.take(order)
+
+
+def meets_base(at: Along, _: Indices) -> Array:
+    """Heat flux less that which a base would give: zero at the base of a flow."""
+    return at.y - at.base_flux
+
+
+def flows_on(batch: Batch, temperature: Array, found: Found) -> Flows:
+    """The zeros of :func:`meets_base` as flows, without an error as yet."""
+    lane, state = found.lane, found.state
+    at = batch.take(lane).along(state)
+    mass = at.p - batch.surface_stress
+    flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[GLIDE]
+    macroscopic = np.empty((4, lane.size))
+    macroscopic[LOG_Q] = np.log(np.maximum(flux, np.finfo(float).tiny))
+    macroscopic[LOG_H] = np.log(at.p * state[MOMENT] / mass)
+    macroscopic[LOG_M] = np.log(mass)
+    macroscopic[LOG_T] = np.log(temperature[lane])
+    return Flows(lane, temperature[lane], state, macroscopic, np.full(lane.size, np.inf))
+
+
+def at_temperature(
+    batch: Batch, temperature: Array, largest_holdup: float, tolerance: float
+) -> tuple[Flows, NDArray[np.bool_]]:
+    """Every flow at the surface temperatures (n,) with hold-ups up to ``largest_holdup``, and the lanes (n,) on
+    which that could not be settled to ``tolerance``, which have no flow among those returned."""
+    deepest = np.full(len(batch), largest_holdup + batch.surface_stress)
+    ends = Ends.of(batch, deepest)
+    coarse = march(batch, temperature, ends, LADDER[0], meets_base)
+    unsettled = coarse.trouble.copy()
+    unsettled[coarse.lane] = True
+    previous = flows_on(batch, temperature, coarse)
+    settled: list[Flows] = []
+    for finer in LADDER[1:]:
+        pending = np.flatnonzero(unsettled)
+        if not pending.size:
+            break
+        previous = previous.take(unsettled[previous.lane])
+        last = np.full(len(batch), 0.0)
+        np.maximum.at(last, previous.lane, _BELOW * np.exp(previous.state[LOG_P]))
+        last[coarse.trouble] = np.inf
+        there = ends.take(pending)
+        there = Ends(np.minimum(there.deepest, last[pending]), there.floor, there.ceiling, there.turn, there.rate)
+        found = march(batch.take(pending), temperature[pending], there, finer, meets_base)
+        fine = flows_on(batch, temperature, Found(pending[found.lane], found.state, unsettled))
+        trouble = np.zeros(len(batch), dtype=bool)
+        trouble[pending] = found.trouble
+        fine, agreed = compared(len(batch), previous, fine)
+        worst = np.zeros(len(batch))
+        np.maximum.at(worst, fine.lane, fine.error)
+        done = unsettled & agreed & ~trouble & (worst <= tolerance)
+        settled.append(fine.take(done[fine.lane]))
+        unsettled &= ~done
+        previous = fine
+    out = Flows.joined(settled)
+    return out.take(out.macroscopic[LOG_M] <= np.log(largest_holdup)), unsettled
+
+
+def compared(lanes: int, coarse: Flows, fine: Flows) -> tuple[Flows, NDArray[np.bool_]]:
+    """The finer flows with the error that their distance from the coarser ones tells, and the lanes on which both
+    are equally many."""
+    many = np.bincount(coarse.lane, minlength=lanes)
+    agreed = many == np.bincount(fine.lane, minlength=lanes)
+    error = np.full(fine.lane.size, np.inf)
+    # Both are in order of lanes, and along each from the surface down.
+    change = np.abs(fine.macroscopic[:, agreed[fine.lane]] - coarse.macroscopic[:, agreed[coarse.lane]])
+    error[agreed[fine.lane]] = np.maximum(SAFETY * change[:LOG_T].max(axis=0, initial=0.0), FLOOR)
+    return Flows(fine.lane, fine.temperature, fine.state, fine.macroscopic, error), agreed

@@ -1,0 +1,211 @@
+"""One chunk of a study: its points to arrays, the same to the last bit wherever and whenever it is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.analysis.enumeration import flows as search
+from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.chute import SURFACES, Chute
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
+from chuteflow.sweeps.at_quantity import at_quantity
+from chuteflow.sweeps.bases import Flows, at_temperature
+from chuteflow.sweeps.batch import Batch, Indices
+from chuteflow.sweeps.numbers import KINDS, numbers
+from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
+from chuteflow.sweeps.study import CHUTE, CONDITIONS, WORDS, Study
+from chuteflow.theory.constitutive import require_positive
+from chuteflow.theory.laws import LAWS, law
+
+_WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
+#: Restitutions between which a law is taken to keep its meaning where it does at both.
+_RESTITUTIONS = 257
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """The points of a chunk: ``parameters`` by name (n,), ``status``, ``reason`` and ``n_flows`` (n,), ``error`` and
+    the ``quantities`` (n, flows); ``failures`` says of the points that failed why, and ``singly`` how many points
+    were solved one by one."""
+
+    parameters: Mapping[str, Array]
+    status: Flags
+    reason: Flags
+    n_flows: NDArray[np.int32]
+    error: Array
+    quantities: Mapping[str, Array]
+    failures: Mapping[int, str]
+    singly: int
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """All arrays by the names that they have in a store."""
+        return {
+            **self.parameters,
+            "status": self.status,
+            "reason": self.reason,
+            "n_flows": self.n_flows,
+            "error": self.error,
+            **self.quantities,
+        }
+
+
+def solve_chunk(study: Study, chunk: int) -> Chunk:
+    """All points of chunk number ``chunk``."""
+    first, last = study.extent(chunk)
+    out = _empty(study, study.design.rows(first, last), last - first)
+    failures: dict[int, str] = {}
+    valid = _valid(out.parameters, study.condition, failures)
+    out.status[~valid] = Status.INVALID
+    out.reason[~valid] = Reason.NO_ANSWER
+    singly = 0
+    for closure, surface, members in _groups(out.parameters, valid):
+        batch = _batch(closure, surface, out.parameters, members)
+        flows, unsettled = _solved(study, batch, out.parameters[study.condition][members])
+        _fill(study, out, members, batch, flows)
+        for lane in np.flatnonzero(unsettled).tolist():
+            singly += 1
+            _fill_singly(study, out, int(members[lane]), failures)
+        _fill_reasons(out, batch, members)
+    return Chunk(**{**vars(out), "failures": {first + i: why for i, why in sorted(failures.items())}, "singly": singly})
+
+
+def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
+    grid = (n, study.flows)
+    return Chunk(
+        parameters=parameters,
+        status=np.full(n, Status.COMPLETE, dtype=np.int8),
+        reason=np.zeros(n, dtype=np.int8),
+        n_flows=np.zeros(n, dtype=np.int32),
+        error=np.full(grid, np.nan),
+        quantities={
+            name: np.full(grid, -1, dtype=np.int8) if name in KINDS else np.full(grid, np.nan)
+            for name in study.quantities
+        },
+        failures={},
+        singly=0,
+    )
+
+
+def _valid(parameters: Mapping[str, Array], condition: str, failures: dict[int, str]) -> NDArray[np.bool_]:
+    """Which points are chutes with a condition in range; why the others are not, into ``failures``."""
+    valid = np.ones(len(parameters["slope"]), dtype=bool)
+    for name in (*CHUTE, condition):
+        low, high = CHUTE[name][:2] if name in CHUTE else CONDITIONS[name]
+        off = ~((parameters[name] >= low) & (parameters[name] <= high))
+        for i in np.flatnonzero(off & valid).tolist():
+            failures[i] = f"{name} = {parameters[name][i]:g}: must be from {low:g} to {high:g}"
+        valid &= ~off
+    for i in np.flatnonzero(valid).tolist():
+        closure = _word("closure", parameters, i)
+        e = float(parameters["e"][i])
+        if law(closure).knows_slope or not _keeps_meaning(closure, e):
+            try:
+                require_positive(law(closure), e, float(parameters["slope"][i]))
+            except InputError as error:
+                valid[i] = False
+                failures[i] = str(error)
+    return valid
+
+
+def _keeps_meaning(closure: str, e: float) -> bool:
+    place = e * (_RESTITUTIONS - 1)
+    good = _meaningful(closure)
+    return bool(good[int(np.floor(place))] and good[int(np.ceil(place))])
+
+
+@lru_cache(maxsize=len(LAWS))
+def _meaningful(closure: str) -> NDArray[np.bool_]:
+    """Whether a law that does not know the slope has a meaning at evenly spaced restitutions from 0 to 1."""
+    good = np.zeros(_RESTITUTIONS, dtype=bool)
+    for i in range(1, _RESTITUTIONS):
+        try:
+            require_positive(law(closure), i / (_RESTITUTIONS - 1), 1.0)
+        except InputError:
+            continue
+        good[i] = True
+    return good
+
+
+def _word(name: str, parameters: Mapping[str, Array], i: int) -> str:
+    return WORDS[name][0][int(parameters[name][i])]
+
+
+def _groups(parameters: Mapping[str, Array], valid: NDArray[np.bool_]) -> Iterator[tuple[str, str, Indices]]:
+    """Closure, surface and points of the groups that share both."""
+    for i, closure in enumerate(LAWS):
+        for j, surface in enumerate(SURFACES):
+            members = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
+            if members.size:
+                yield closure, surface, members
+
+
+def _batch(closure: str, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
+    roughness = np.minimum(parameters["roughness"][members], CHUTE["roughness"][1] - 5e-5)
+    slope, e, ew = (np.ascontiguousarray(parameters[name][members]) for name in ("slope", "e", "ew"))
+    return Batch.of(closure, surface, slope, e, ew, roughness)
+
+
+def _solved(study: Study, batch: Batch, value: Array) -> tuple[Flows, NDArray[np.bool_]]:
+    if study.condition == "T_surface":
+        return at_temperature(batch, value, study.largest_holdup, study.tolerance)
+    which = _WHICH[study.condition]
+    return at_quantity(batch, which, value, study.surface_temperature, study.largest_holdup, study.tolerance)
+
+
+def _fill(study: Study, out: Chunk, members: Indices, batch: Batch, flows: Flows) -> None:
+    """Put flows, in order of lanes and along each from hot to cold, into the rows of their points."""
+    counts = np.bincount(flows.lane, minlength=len(batch))
+    out.n_flows[members] = counts
+    out.status[members[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
+    place = np.arange(flows.lane.size) - (np.cumsum(counts) - counts)[flows.lane]
+    kept = np.flatnonzero(place < study.flows)
+    flows, place = flows.take(kept), place[kept]
+    out.error[members[flows.lane], place] = flows.error
+    for name, values in numbers(study.quantities, batch, flows).items():
+        out.quantities[name][members[flows.lane], place] = values
+
+
+def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str]) -> None:
+    """Solve one point by the search of :func:`chuteflow.flows`."""
+    p = out.parameters
+    numbers_ = {CHUTE[name][2]: float(p[name][point]) for name in CHUTE}
+    words = {name: _word(name, p, point) for name in WORDS}
+    condition = {study.condition: float(p[study.condition][point])}
+    try:
+        found = search(
+            Chute(**numbers_, **words),
+            **condition,
+            tolerance=study.tolerance,
+            surface_temperature=study.surface_temperature,
+            largest_holdup=study.largest_holdup,
+        )
+    except ChuteflowError as error:
+        out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER
+        failures[point] = str(error)
+        return
+    out.n_flows[point] = len(found)
+    if len(found) > study.flows:
+        out.status[point] = Status.MORE_FLOWS_THAN_KEPT
+    for k, flow in enumerate(found[: study.flows]):
+        out.error[point, k] = flow.error
+        for name, values in out.quantities.items():
+            value = getattr(flow, name)
+            values[point, k] = KINDS[name].index(value) if name in KINDS else value
+
+
+def _fill_reasons(out: Chunk, batch: Batch, members: Indices) -> None:
+    none = np.flatnonzero((out.n_flows[members] == 0) & (out.status[members] == Status.COMPLETE))
+    if none.size:
+        out.reason[members[none]] = reasons(batch.take(none))
+
+
+def parameter_words(name: str) -> tuple[str, ...]:
+    """The words that the numbers of a parameter stand for; none for a plain number."""
+    return cast(tuple[str, ...], WORDS[name][0]) if name in WORDS else ()

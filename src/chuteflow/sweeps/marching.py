@@ -1,0 +1,406 @@
+"""Integration from the surface down of many lanes at once, and the places on the way where something happens.
+
+# notation: tau the step variable, d ln p/d tau = 1/(1 + p/p_1): logarithmic in the thin layer at the surface,
+# uniform below.
+
+The method is DOP853 (Hairer, Norsett & Wanner 1993), each lane with its own step. An event is a function of the
+state that changes its sign; it is seen at the stages of a step, and located by shorter steps from the same
+start, which are as accurate as the integration itself. Steps in which an event may have two zeros, or nearly
+has, are looked at more closely. Nothing of a lane depends on the lanes beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Along, Batch, Indices
+from chuteflow.sweeps.zeros import zeros
+
+Event = Callable[[Along, Indices], Array]
+
+#: Lanes treated at once: so many that the interpreter does not count, so few that they fit the cache.
+LANES = 8192
+_EMPTY, _DENSE = float(np.log(1e-6)), 60.0
+_COLD = 4.0
+_MOST_STEPS = 4000
+#: Parts of a step that is looked at more closely.
+_PARTS = 8
+#: A zero is known to this share of its step, or where its event is this small.
+_RESOLUTION, _SMALL = 4e-15, 1e-16
+#: A turn of an event this near to zero, in the spread of its values in the step, is looked at more closely.
+_NEAR = 0.3
+#: Nodes of Gauss's rule with three points on [0, 1], and its weights.
+_GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """``tolerance`` of a step, relative, in every row of the state but the height; and the share ``start`` of T, or of
+    a length of the equations, at which the series at a free surface is left."""
+
+    tolerance: float
+    start: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, empty
+    with a heat flux above ``ceiling``, beyond which none is met. ``turn`` is p_1."""
+
+    deepest: Array
+    floor: Array
+    ceiling: Array
+    turn: Array
+    rate: Array
+
+    @classmethod
+    def of(cls, batch: Batch, deepest: Array) -> Ends:
+        """The ends of the lanes of ``batch`` at normal stresses ``deepest`` (n,)."""
+        rate, balance = batch.pace()
+        floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
+        conduction, net, meets, _ = batch.at_density(np.full(len(batch), 1e-12))
+        # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux.
+        limit = np.sqrt(np.maximum(2.0 * net * conduction, 0.0))
+        ceiling = np.where(net > 0.0, np.where(meets > limit, 0.0, np.maximum(meets, 0.0)), np.inf)
+        return cls(deepest, floor, ceiling, 1.0 / np.maximum(rate, 1e-3), rate)
+
+    def take(self, lanes: Indices) -> Ends:
+        """The ends of ``lanes``."""
+        return Ends(self.deepest[lanes], self.floor[lanes], self.ceiling[lanes], self.turn[lanes], self.rate[lanes])
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Zeros of an event in order of lanes, along each from the surface down: ``lane`` (k,) and ``state`` (ROWS, k).
+
+    ``trouble`` (n,) marks the lanes on which zeros may be missing: where the integration gave up, or a zero lies
+    above its start.
+    """
+
+    lane: Indices
+    state: Array
+    trouble: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=1)
+def _tableau() -> tuple[Array, Array, Array, Array]:
+    """Weights of the stages, of the step and of the two estimates of its error."""
+    from scipy.integrate import DOP853
+
+    return np.array(DOP853.A[:12, :12]), np.array(DOP853.B), np.array(DOP853.E3), np.array(DOP853.E5)
+
+
+#: Stages at which an event is seen, in the order of their places in the step; the last is its end.
+_SEEN = (0, 6, 5, 9, 10, 12)
+
+
+def march(
+    batch: Batch,
+    temperature: Array,
+    ends: Ends,
+    accuracy: Accuracy,
+    event: Event,
+) -> Found:
+    """All zeros of ``event`` on the trajectories from the surface temperatures ``temperature`` (n,).
+
+    ``event`` takes the fields at one point of some lanes and the numbers of the lanes.
+    """
+    n = len(batch)
+    trouble = np.zeros(n, dtype=bool)
+    zeros: list[tuple[Indices, Array]] = []
+    for first in range(0, n, LANES):
+        lanes = np.arange(first, min(first + LANES, n))
+        lane, state = _march(
+            batch.take(lanes),
+            temperature[lanes],
+            ends.take(lanes),
+            accuracy,
+            lambda at, some, lanes=lanes: event(at, lanes[some]),
+            trouble[first : first + LANES],
+        )
+        zeros.append((lanes[lane], state))
+    lane = np.concatenate([z[0] for z in zeros]) if zeros else np.empty(0, dtype=np.intp)
+    state = np.concatenate([z[1] for z in zeros], axis=1) if zeros else np.empty((ROWS, 0))
+    order = np.lexsort((state[LOG_P], lane))
+    return Found(lane[order], state[:, order], trouble)
+
+
+def _march(
+    batch: Batch, temperature: Array, ends: Ends, accuracy: Accuracy, event: Event, trouble: NDArray[np.bool_]
+) -> tuple[Indices, Array]:
+    _, _, e3, e5 = _tableau()
+    # What overflows is in a step that is rejected, or on a lane that ends.
+    with np.errstate(all="ignore"):
+        state, above = start(batch, temperature, ends.rate, accuracy.start)
+        lane = np.arange(len(batch))
+        here = batch.along(state)
+        slope = np.empty_like(state)
+        _in_tau(here, state, ends.turn, slope)
+        seen = event(here, lane)
+        trouble |= (event(above, lane) > 0.0) != (seen > 0.0)
+        h = np.full(len(batch), 0.5)
+        steps: list[tuple[Indices, Array, Array, Array]] = []
+        local, edges = batch, ends
+        count = 0
+        while lane.size:
+            count += 1
+            stages = np.empty((13, ROWS, lane.size))
+            values = np.empty((13, lane.size))
+            stages[0], values[0] = slope, seen
+            end = _step(local, edges, state, h, stages, values, lambda at, lane=lane: event(at, lane))
+            error = _error(stages, state, end, h, e3, e5, accuracy.tolerance)
+            good = error < 1.0
+            factor = 0.9 * error**-0.125
+            factor = np.where(np.isfinite(factor), factor, 0.2)
+            # The first stages of a step into a cold end may not be finite: any such step is cut.
+            good &= np.isfinite(end).all(axis=0)
+            h_next = h * np.minimum(np.maximum(factor, 0.2), 5.0)
+            _note(lane, state, h, values, good, steps)
+            state = np.where(good, end, state)
+            slope = np.where(good, stages[12], slope)
+            seen = np.where(good, values[12], seen)
+            p, y = np.exp(state[LOG_P]), state[FLUX]
+            h = h_next
+            done = (p >= edges.deepest) | (y < edges.floor) | (state[LOG_X] > _DENSE)
+            done |= (state[LOG_X] < _EMPTY) & (y > edges.ceiling) & (p > edges.turn)
+            stuck = ~(h > 1e-9) | (count > _MOST_STEPS)
+            trouble[lane[stuck & ~done]] = True
+            done |= stuck
+            if done.any():
+                keep = np.flatnonzero(~done)
+                lane, state, slope, seen, h = lane[keep], state[:, keep], slope[:, keep], seen[keep], h[keep]
+                local, edges = local.take(keep), edges.take(keep)
+        return _located(batch, ends, steps, event)
+
+
+def _in_tau(at: Along, state: Array, turn: Array, out: Array) -> None:
+    at.derivative(state, out)
+    out /= 1.0 + at.p / turn
+
+
+def _step(
+    batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Along], Array]
+) -> Array:
+    """One step of each lane: fills the derivatives (13, ROWS, n) and events (13, n) at the stages after the first,
+    and returns the states at the end."""
+    a, b, _, _ = _tableau()
+    for i in range(1, 12):
+        moved = state.copy()
+        moved[:HEIGHT] += h * _combined(a[i, :i], stages[:i, :HEIGHT])  # nothing depends on the height
+        at = batch.along(moved)
+        _in_tau(at, moved, ends.turn, stages[i])
+        if i in _SEEN:
+            values[i] = event(at)
+    end = state + h * _combined(b, stages[:12])
+    at = batch.along(end)
+    _in_tau(at, end, ends.turn, stages[12])
+    values[12] = event(at)
+    return end
+
+
+def _combined(weights: Array, stages: Array) -> Array:
+    """The sum of the stages with their weights, in an order that no thread changes."""
+    used = np.flatnonzero(weights)
+    out = weights[used[0]] * stages[used[0]]
+    for i in used[1:]:
+        out += weights[i] * stages[i]
+    return out
+
+
+def _error(stages: Array, state: Array, end: Array, h: Array, e3: Array, e5: Array, tolerance: float) -> Array:
+    """Error of ln X and y in the step over what is allowed, as Hairer's DOP853 has it."""
+    rows = stages[:, :HEIGHT]
+    largest = np.maximum(np.abs(state[:HEIGHT]), np.abs(end[:HEIGHT]))
+    scale = tolerance * largest
+    scale[:FLUX] = tolerance
+    scale[FLUX] += 1e-3 * tolerance
+    fifth = ((_combined(e5, rows) / scale) ** 2).sum(axis=0)
+    third = ((_combined(e3, rows) / scale) ** 2).sum(axis=0)
+    both = fifth + 0.01 * third
+    out = np.abs(h) * fifth / np.sqrt(HEIGHT * np.maximum(both, 1e-300))
+    return np.where(both > 0.0, out, np.where(both == 0.0, 1e-10, np.inf))
+
+
+def _note(
+    lane: Indices,
+    state: Array,
+    h: Array,
+    values: Array,
+    good: NDArray[np.bool_],
+    steps: list[tuple[Indices, Array, Array, Array]],
+) -> None:
+    """Keep the steps in which the event has a zero, or may have."""
+    seen = values[list(_SEEN)]
+    positive = seen > 0.0
+    changes = (positive[1:] != positive[:-1]).any(axis=0)
+    nearest = np.abs(seen).min(axis=0)
+    inner = np.abs(seen[1:-1]).min(axis=0)
+    turns = (inner < np.minimum(np.abs(seen[0]), np.abs(seen[-1]))) & (nearest < _NEAR * np.ptp(seen, axis=0))
+    some = np.flatnonzero(good & (changes | turns))
+    if some.size:
+        steps.append((lane[some], state[:, some], h[some], seen[:, some]))
+
+
+def _located(
+    batch: Batch, ends: Ends, steps: list[tuple[Indices, Array, Array, Array]], event: Event
+) -> tuple[Indices, Array]:
+    """The zeros in the steps kept."""
+    if not steps:
+        return np.empty(0, dtype=np.intp), np.empty((ROWS, 0))
+    lane = np.concatenate([s[0] for s in steps])
+    state = np.concatenate([s[1] for s in steps], axis=1)
+    h = np.concatenate([s[2] for s in steps])
+    seen = np.concatenate([s[3] for s in steps], axis=1)
+    walk = Walk(batch.take(lane), ends.take(lane), lane, state, h, event)
+    positive = seen > 0.0
+    changes = (positive[1:] != positive[:-1]).sum(axis=0)
+    single = np.flatnonzero((changes == 1) & (positive[0] != positive[-1]))
+    low, high = np.zeros(single.size), np.ones(single.size)
+    brackets = [(single, low, high, seen[0, single], seen[-1, single])]
+    other = np.setdiff1d(np.arange(lane.size), single)
+    brackets += list(_closer(walk, other, seen[0, other], seen[-1, other]))
+    which, low, high, f_low, f_high = (np.concatenate(part) for part in zip(*brackets, strict=True))
+    which = which.astype(np.intp)
+    share = zeros(lambda some, x: walk.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
+    end, _ = walk.to(which, share)
+    return lane[which], end
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Steps from which one may go a share of the way: starts (ROWS, k) on the ``lane`` of each, of the length h."""
+
+    batch: Batch
+    ends: Ends
+    lane: Indices
+    state: Array
+    h: Array
+    event: Event
+
+    def to(self, which: Indices, share: Array) -> tuple[Array, Array]:
+        """States (ROWS, m) and events (m,) at shares (m,) of the steps ``which``."""
+        out, values = np.empty((ROWS, which.size)), np.empty(which.size)
+        for first in range(0, which.size, LANES):
+            part = slice(first, first + LANES)
+            some = which[part]
+            local, edges, lane = self.batch.take(some), self.ends.take(some), self.lane[some]
+            state = self.state[:, some]
+            stages, seen = np.empty((13, ROWS, some.size)), np.empty((13, some.size))
+            _in_tau(local.along(state), state, edges.turn, stages[0])
+            out[:, part] = _step(
+                local,
+                edges,
+                state,
+                share[part] * self.h[some],
+                stages,
+                seen,
+                lambda at, lane=lane: self.event(at, lane),
+            )
+            values[part] = seen[12]
+        return out, values
+
+
+def _closer(
+    walk: Walk, which: Indices, first: Array, last: Array
+) -> Iterator[tuple[Indices, Array, Array, Array, Array]]:
+    """Brackets of zeros in steps that may hold several: between shares of them, and beside turns near zero."""
+    if not which.size:
+        return
+    shares = np.linspace(0.0, 1.0, _PARTS + 1)
+    values = np.empty((_PARTS + 1, which.size))
+    values[0], values[-1] = first, last
+    for i in range(1, _PARTS):
+        values[i] = walk.to(which, np.full(which.size, shares[i]))[1]
+    at = np.broadcast_to(shares[:, None], values.shape)
+    # A parabola through three neighbours tells where a turn may pass zero; the value there is computed.
+    for _ in range(3):
+        left, middle, right = values[:-2], values[1:-1], values[2:]
+        turn = (np.abs(middle) <= np.abs(left)) & (np.abs(middle) <= np.abs(right))
+        turn &= ((left > 0.0) == (middle > 0.0)) & ((right > 0.0) == (middle > 0.0))
+        if not turn.any():
+            break
+        row = np.where(turn, np.abs(middle), np.inf).argmin(axis=0) + 1
+        columns = np.arange(which.size)
+        s0, s1, s2 = (at[row + k, columns] for k in (-1, 0, 1))
+        f0, f1, f2 = (values[row + k, columns] for k in (-1, 0, 1))
+        one, two = (s1 - s0) * (f1 - f2), (s1 - s2) * (f1 - f0)
+        bottom = one - two
+        vertex = s1 - 0.5 * ((s1 - s0) * one - (s1 - s2) * two) / np.where(bottom == 0.0, 1.0, bottom)
+        inside = turn.any(axis=0) & (bottom != 0.0) & (vertex > s0) & (vertex < s2) & (vertex != s1)
+        vertex = np.where(inside, vertex, 0.5 * (s0 + s1))
+        there = walk.to(which, vertex)[1]
+        at, values = np.vstack([at, vertex]), np.vstack([values, there])
+        order = np.argsort(at, axis=0, kind="stable")
+        at, values = np.take_along_axis(at, order, 0), np.take_along_axis(values, order, 0)
+    rows, columns = np.nonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
+    yield which[columns], at[rows, columns], at[rows + 1, columns], values[rows, columns], values[rows + 1, columns]
+
+
+def start(batch: Batch, temperature: Array, rate: Array, share: float) -> tuple[Array, Along]:
+    """States (ROWS, n) a little below the free surface, or at the interface, and the fields at the very surface."""
+    if batch.surface_stress:
+        state = _at_interface(batch, temperature)
+        return state, batch.along(state)
+    p = share * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
+    empty = Along(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
+    return _series(batch, temperature, p, empty), empty
+
+
+def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
+    """The state at p by the series at the surface of the half-line, (3.23)-(3.25): y and theta to a relative p^2."""
+    half = 0.5 * empty.net
+    lean = half / empty.conduction
+    theta = np.log(temperature) + 0.5 * p**2 * lean
+    x = p * np.exp(-theta)
+    y = p * half
+    densest = batch.law.densest
+    for _ in range(6):
+        nu = x / (1.0 + x / densest)
+        gamma = np.zeros_like(p)
+        for node, weight in _GAUSS:
+            inner = node * nu
+            gamma += weight * nu * _coupling(batch, inner / (1.0 - inner / densest))
+        at = Along(batch, p, np.log(x), y)
+        y = p * (half + (at.net - empty.net) / 3.0 - half * (at.v + at.coupling * (1.0 - at.v)) / 6.0)
+        theta = np.log(temperature) + 0.5 * p**2 * lean + p * (y / at.conduction - p * lean) / 3.0
+        nu = p * np.exp(-theta - gamma) / (p / (at.nu * at.temperature))
+        x = nu / (1.0 - nu / densest)
+    at = Along(batch, p, np.log(x), y)
+    state, derivative = np.zeros((ROWS, p.size)), np.empty((ROWS, p.size))
+    state[LOG_P], state[LOG_X], state[FLUX] = np.log(p), np.log(x), y
+    at.derivative(state, derivative)
+    # P dz/dp runs from T at the surface, P du/dp over P from its value in an empty flow; z is counted from here.
+    thickness = derivative[HEIGHT]
+    thinning = thickness * (1.0 - derivative[LOG_X] / (1.0 + x / densest))
+    state[MOMENT] = (temperature + 2.0 * thickness) / 3.0 - thinning / 6.0
+    state[GLIDE] = batch.slope * empty.work * np.sqrt(temperature) / 6.0 + derivative[GLIDE] / 3.0
+    return state
+
+
+def _coupling(batch: Batch, x: Array) -> Array:
+    """g4/g3 at X."""
+    at = Along(batch, np.ones_like(x), np.log(x), np.zeros_like(x))
+    return at.raw_coupling
+
+
+def _at_interface(batch: Batch, temperature: Array) -> Array:
+    """The state at the interface (3.31), (3.32): the density is that of p_S and T."""
+    p = np.full(len(batch), batch.surface_stress)
+    log_x = np.log(p / temperature)
+    for _ in range(100):
+        at = Along(batch, p, log_x, np.zeros_like(p))
+        # d ln g1/d ln X = stiffness dln nu/dln X
+        move = np.clip(np.log(at.temperature / temperature) / at.stiff_x, -2.0, 2.0)
+        log_x = log_x + move
+        if np.abs(move).max(initial=0.0) < 1e-14:
+            break
+    state = np.zeros((ROWS, len(batch)))
+    state[LOG_P], state[LOG_X] = np.log(p), log_x
+    state[FLUX] = -(batch.slope**2)  # (3.32)
+    return state

@@ -1,0 +1,196 @@
+"""Running a study: chunks handed out to workers, one machine's or a cluster's, until all are done.
+
+Workers write their chunks themselves, so that nothing but the marker of a chunk comes back, and memory is bounded
+by the chunks at work. Chunks are handed out in a window that moves on, so that neither is the study itself ever
+held as a list of tasks.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from chuteflow.errors import InputError
+from chuteflow.sweeps.store import Marker, Store, StoreError
+from chuteflow.sweeps.work import Done, end_with_parent, work
+
+#: Chunks handed out for each worker: one at work and one waiting.
+_AHEAD = 2
+#: A chunk that ends this many workers is given up.
+_MOST_DEATHS = 3
+#: Libraries of linear algebra take one thread in a worker: the workers are the threads.
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """``count`` workers, how to ``start`` them, anew where they died, and what is raised when one has: ``deaths``."""
+
+    count: int
+    start: Callable[[], AbstractContextManager[Executor]]
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+
+def local_workers(count: int) -> Workers:
+    """Processes of this machine.
+
+    Raises:
+        InputError: for a count below one.
+    """
+    if count < 1:
+        raise InputError(f"--workers {count}: must be 1 or more")
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        before = {name: os.environ.get(name) for name in _ONE_THREAD}
+        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+        # Spawned, not forked: a worker shares neither lock nor threads with this process.
+        pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_begin)
+        try:
+            yield pool
+        finally:
+            processes = list((getattr(pool, "_processes", None) or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.terminate()
+            for process in processes:
+                process.join()
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+    return Workers(count, start)
+
+
+def _begin() -> None:
+    """Set up a worker: an interrupt is for the client, which ends its workers."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+
+
+def cluster_workers(address: str) -> Workers:
+    """The workers of the dask.distributed scheduler at ``address``, which must see the store under its path.
+
+    Raises:
+        InputError: where dask.distributed is not installed, or nothing answers at the address.
+    """
+    try:
+        from distributed import Client, KilledWorker
+        from distributed.client import FutureCancelledError
+    except ImportError:
+        raise InputError(
+            "--cluster needs dask.distributed: install it with the extra 'cluster', chuteflow[cluster]"
+        ) from None
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"--cluster {address}: no scheduler answers there ({error or 'timed out'})") from None
+    try:
+        count = max(sum(client.nthreads().values()), 1)
+    finally:
+        client.close()
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        # Keyed by itself, a chunk that another client handed out before would not run.
+        with Client(address, timeout=10, set_as_default=False) as connected:
+            executor = connected.get_executor(pure=False, retries=_MOST_DEATHS)
+            try:
+                yield executor
+            finally:
+                executor.shutdown(wait=False)
+
+    return Workers(count, start, (BrokenExecutor, KilledWorker, FutureCancelledError))
+
+
+def here() -> Workers:
+    """This process itself, one chunk after the other."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    return Workers(1, lambda: ThreadPoolExecutor(1))
+
+
+def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marker]:
+    """Compute the ``chunks`` that are not done, and yield the marker of each as it is.
+
+    Raises:
+        StoreError: where a chunk cannot be written, or ends its worker again and again.
+    """
+    deaths: Counter[int] = Counter()
+    left = _Left(iter(chunks), store)
+    while True:
+        with workers.start() as executor:
+            broken = yield from _until_broken(store, left, executor, workers, deaths)
+        if not broken:
+            return
+
+
+class _Left:
+    """The chunks that are still to be handed out, those that came back first."""
+
+    def __init__(self, chunks: Iterator[int], store: Store) -> None:
+        self._chunks, self._store = chunks, store
+        self._again: list[int] = []
+
+    def back(self, chunk: int) -> None:
+        self._again.append(chunk)
+
+    def next(self) -> int | None:
+        if self._again:
+            return self._again.pop()
+        for chunk in self._chunks:
+            if not self._store.is_done(chunk):
+                return chunk
+        return None
+
+
+def _until_broken(
+    store: Store, left: _Left, executor: Executor, workers: Workers, deaths: Counter[int]
+) -> Iterator[Marker]:
+    """Hand out chunks until none is left, which returns False, or the workers have died, which returns True."""
+    out: dict[Future[Done], int] = {}
+    path = str(store.path.resolve())
+    broken = False
+    while True:
+        while not broken and len(out) < _AHEAD * workers.count:
+            chunk = left.next()
+            if chunk is None:
+                break
+            try:
+                out[executor.submit(work, path, chunk)] = chunk
+            except workers.deaths:
+                left.back(chunk)
+                broken = True
+        if not out:
+            return broken
+        for future in wait(out, return_when=FIRST_COMPLETED).done:
+            chunk = out.pop(future)
+            try:
+                done = future.result()
+            except workers.deaths:
+                broken = True
+                deaths[chunk] += 1
+                if deaths[chunk] > _MOST_DEATHS * workers.count:
+                    raise StoreError(
+                        f"chunk {chunk} ended its worker {deaths[chunk]} times: give the study a smaller chunk, or the "
+                        "workers more memory"
+                    ) from None
+                left.back(chunk)
+            except OSError as error:
+                raise StoreError(
+                    f"chunk {chunk} could not be written: {error.strerror or error}; what is done is kept, and the "
+                    "same command goes on from there"
+                ) from None
+            else:
+                yield done.marker

@@ -1,0 +1,254 @@
+"""A study as a TOML file: what is varied, how, what is kept, and in which pieces; read and checked once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.errors import InputError
+from chuteflow.steady.chute import SURFACES
+from chuteflow.steady.quantities import NUMBERS
+from chuteflow.sweeps.designs import DESIGNS, Axis, Design, axis_from, list_design
+from chuteflow.theory.boundary import ROUGHNESS_RANGE
+from chuteflow.theory.laws import LAWS
+
+#: Numbers of a chute: least and largest value, and their names in :class:`chuteflow.Chute`.
+CHUTE = {
+    "slope": (1e-8, 1e4, "slope"),
+    "e": (1e-8, 1.0, "restitution"),
+    "ew": (0.0, 1.0, "wall_restitution"),
+    "roughness": (ROUGHNESS_RANGE[0], ROUGHNESS_RANGE[1] + 5e-5, "roughness"),
+}
+#: Conditions: least and largest value.
+CONDITIONS = {"T_surface": WIDEST, "Q": (1e-12, 1e12), "M": (1e-12, DEEPEST), "h": (1e-12, 1e12)}
+#: Names, and what they are where a study does not give them.
+WORDS = {"surface": (SURFACES, "free"), "closure": (tuple(LAWS), "lun")}
+#: Kinds of a flow that can be kept beside the numbers of the registry.
+KINDS = ("interior", "density")
+DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+#: Points of a chunk: at a given surface temperature, and otherwise, when more has to be done for each.
+CHUNKS = {"T_surface": 16384}
+CHUNK = 2048
+TOLERANCE = 1e-8
+_MOST_CHUNK, _MOST_POINTS, _MOST_FLOWS = 1 << 20, 1 << 40, 64
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study of very many chutes.
+
+    ``design`` gives the parameters of each point; ``condition`` is the name of the one of them that is a condition on
+    the flow ("T_surface", "Q", "M" or "h"). ``quantities`` are kept of each of at most ``flows`` flows of a point.
+    Flows are sought at surface temperatures in ``surface_temperature`` and hold-ups up to ``largest_holdup``,
+    each to a relative error of ``tolerance`` in Q, h and M. Points are treated in pieces of ``chunk``.
+    """
+
+    title: str
+    design: Design
+    condition: str
+    quantities: tuple[str, ...] = DEFAULT_QUANTITIES
+    flows: int = 8
+    tolerance: float = TOLERANCE
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE
+    largest_holdup: float = LARGEST_HOLDUP
+    chunk: int = CHUNK
+    canonical: str = field(default="", compare=False)
+
+    @property
+    def points(self) -> int:
+        """How many points there are."""
+        return self.design.points
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return -(-self.points // self.chunk)
+
+    def extent(self, chunk: int) -> tuple[int, int]:
+        """First point of a chunk, and the one after its last."""
+        return chunk * self.chunk, min((chunk + 1) * self.chunk, self.points)
+
+    @property
+    def digest(self) -> str:
+        """What tells this study from every other, whatever its file looks like."""
+        return hashlib.sha256(self.canonical.encode()).hexdigest()
+
+
+def read(path: str | os.PathLike[str]) -> Study:
+    """The study in the TOML file ``path``.
+
+    Raises:
+        InputError: naming the key that is missing, unknown or out of range.
+    """
+    source = Path(path)
+    try:
+        text = source.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the study {path}: {getattr(error, 'strerror', None) or error}") from None
+    try:
+        given = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"the study {path} is not TOML: {error}") from None
+    return from_dict(given, source.parent)
+
+
+def from_canonical(text: str) -> Study:
+    """The study of a canonical form."""
+    return from_dict(json.loads(text), Path())
+
+
+def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
+    """The study of a table, with files relative to ``folder``.
+
+    Raises:
+        InputError: naming the key that is missing, unknown or out of range.
+    """
+    _only(given, "", ("title", "design", "parameters", "search", "results"))
+    head, search, results = (_table(given, name) for name in ("design", "search", "results"))
+    kind = head.get("kind", "product")
+    if kind not in (*DESIGNS, "list"):
+        raise InputError(f"design.kind = {kind!r}: choose one of {', '.join((*DESIGNS, 'list'))}")
+    parameters = _table(given, "parameters")
+    if kind == "list":
+        _only(head, "design.", ("kind", "file"))
+        columns = list_design(head, parameters, folder, WORDS)
+        parameters = columns.table
+        axes = columns.axes
+    else:
+        _only(head, "design.", ("kind", *DESIGNS[kind].settings))
+        axes = {name: axis_from(name, value, WORDS) for name, value in parameters.items()}
+    condition = _checked_names(axes)
+    for name, (_, default) in WORDS.items():
+        if name not in axes:
+            axes[name] = axis_from(name, default, WORDS)
+    if kind != "list":
+        for axis in axes.values():
+            _check_range(axis)
+    design = DESIGNS[kind].make(head, axes) if kind != "list" else Design.listed(axes)
+    if not 1 <= design.points <= _MOST_POINTS:
+        raise InputError(f"the design has {design.points} points: must be from 1 to {_MOST_POINTS}")
+    _only(search, "search.", ("tolerance", "surface_temperature", "largest_holdup"))
+    _only(results, "results.", ("quantities", "flows", "chunk"))
+    tolerance = _number(search, "search.tolerance", TOLERANCE, 1e-10, 1e-3)
+    deepest = _number(search, "search.largest_holdup", LARGEST_HOLDUP, SHALLOWEST, DEEPEST)
+    warm = _interval(search.get("surface_temperature", SURFACE_TEMPERATURE))
+    Range.checked(warm, deepest)
+    study = Study(
+        title=str(given.get("title", "")),
+        design=design,
+        condition=condition,
+        quantities=_quantities(results.get("quantities", list(DEFAULT_QUANTITIES))),
+        flows=int(_number(results, "results.flows", 8, 1, _MOST_FLOWS, whole=True)),
+        tolerance=tolerance,
+        surface_temperature=warm,
+        largest_holdup=deepest,
+        chunk=int(_number(results, "results.chunk", CHUNKS.get(condition, CHUNK), 1, _MOST_CHUNK, whole=True)),
+    )
+    object.__setattr__(study, "canonical", _canonical(study, kind, head, parameters))
+    return study
+
+
+def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Mapping[str, Any]) -> str:
+    """The study as JSON with every default written out: the same for all files that mean the same."""
+    settings = {name: head[name] for name in head if name not in ("kind", "file")}
+    whole = {
+        "title": study.title,
+        "design": {"kind": kind, **settings},
+        # In their order, in which the points are counted.
+        "parameters": {n: _plain(v) for n, v in parameters.items()}
+        | {n: d for n, (_, d) in WORDS.items() if n not in parameters},
+        "search": {
+            "tolerance": study.tolerance,
+            "surface_temperature": list(study.surface_temperature),
+            "largest_holdup": study.largest_holdup,
+        },
+        "results": {"quantities": list(study.quantities), "flows": study.flows, "chunk": study.chunk},
+    }
+    return json.dumps(whole, allow_nan=False, separators=(",", ":"))
+
+
+def _plain(value: Any) -> Any:
+    """A value of the table with numbers as floats, and the keys of a range in order."""
+    if isinstance(value, Mapping):
+        plain = {"scale": "linear"} | {k: v if k in ("points", "scale") else float(v) for k, v in value.items()}
+        return dict(sorted(plain.items()))
+    if isinstance(value, list):
+        return [_plain(v) for v in value]
+    return value if isinstance(value, str) else float(value)
+
+
+def _checked_names(axes: Mapping[str, Axis]) -> str:
+    """The condition among the parameters, once it is sure that they are complete."""
+    known = (*CHUTE, *CONDITIONS, *WORDS)
+    for name in axes:
+        if name not in known:
+            raise InputError(f"unknown parameter {name!r}: choose from {', '.join(known)}")
+    missing = [name for name in CHUTE if name not in axes]
+    if missing:
+        raise InputError(f"parameters.{missing[0]} is missing: the study needs {', '.join(CHUTE)} and a condition")
+    conditions = [name for name in CONDITIONS if name in axes]
+    if len(conditions) != 1:
+        got = ", ".join(conditions) or "none"
+        raise InputError(f"parameters: give exactly one of {', '.join(CONDITIONS)} as the condition: got {got}")
+    return conditions[0]
+
+
+def _check_range(axis: Axis) -> None:
+    if axis.name in WORDS:
+        return
+    low, high = CHUTE[axis.name][:2] if axis.name in CHUTE else CONDITIONS[axis.name]
+    for value in axis.extremes:
+        if not low <= value <= high:
+            raise InputError(f"parameters.{axis.name} reaches {value:g}: must be from {low:g} to {high:g}")
+
+
+def _quantities(names: Any) -> tuple[str, ...]:
+    known = (*NUMBERS, *KINDS)
+    if not isinstance(names, list) or not names:
+        raise InputError(f"results.quantities = {names!r}: must be a list of names, from {', '.join(known)}")
+    for name in names:
+        if name not in known:
+            raise InputError(f"results.quantities: unknown quantity {name!r}: choose from {', '.join(known)}")
+    return tuple(dict.fromkeys(names))
+
+
+def _table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = given.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} = {table!r}: must be a table, [{name}]")
+    return table
+
+
+def _only(table: Mapping[str, Any], where: str, known: tuple[str, ...]) -> None:
+    for name in table:
+        if name not in known:
+            raise InputError(f"unknown key {where}{name}: choose from {', '.join(known)}")
+
+
+def _number(
+    table: Mapping[str, Any], key: str, default: float, low: float, high: float, *, whole: bool = False
+) -> float:
+    value = table.get(key.rpartition(".")[2], default)
+    kinds = int if whole else (int, float)
+    if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
+        what = "a whole number" if whole else "a number"
+        raise InputError(f"{key} = {value!r}: must be {what} from {low:g} to {high:g}")
+    return value
+
+
+def _interval(value: Any) -> tuple[float, float]:
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not math.isfinite(low + high):
+        raise InputError(f"search.surface_temperature = {value!r}: must be two numbers, [low, high]")
+    return low, high

@@ -1,0 +1,53 @@
+"""What a worker does: one chunk, computed and written."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from dataclasses import dataclass
+
+from chuteflow.sweeps.engine import solve_chunk
+from chuteflow.sweeps.store import Marker, Store
+
+
+@dataclass(frozen=True)
+class Done:
+    """A chunk that a worker has done: its marker, and whether it was done before."""
+
+    marker: Marker
+    before: bool
+
+
+def work(path: str, chunk: int) -> Done:
+    """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done already."""
+    store = Store.opened(path)
+    if store.is_done(chunk):
+        return Done(store.marker(chunk), True)
+    begin = time.perf_counter()
+    solved = solve_chunk(store.study, chunk)
+    marker = Marker(
+        chunk=chunk,
+        points=len(solved.status),
+        flows=int(solved.n_flows.sum()),
+        singly=solved.singly,
+        seconds=round(time.perf_counter() - begin, 3),
+        failures=dict(solved.failures),
+    )
+    store.put(chunk, solved.arrays(), marker)
+    return Done(marker, False)
+
+
+def end_with_parent() -> None:
+    """Let this worker end when the process that started it does, however that ends."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
