@@ -106,7 +106,7 @@ class Problem:
         )
         for row, value in zip(range(1, 5), (pxz, pyz, pzz, qz), strict=True):
             out[..., row, :, 0] = value[..., 0]
-        base = {name: f[..., -1] for name, f in zip("u v w T nu".split(), (u, v, w, T, nu), strict=True)}
+        base = {name: f[..., -1] for name, f in zip(["u", "v", "w", "T", "nu"], (u, v, w, T, nu), strict=True)}
         lid = math.sqrt(1.0 - case.r**2)
         kappa = 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)
         a = 1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * base["nu"] * g.g0[..., -1]))

@@ -206,10 +206,14 @@ def leading(
             break
     if doubtful:
         raise SolveError(
-            f"something seems to grow at kx = {kx:g}, ky = {ky:g} that the finest grids do not resolve: "
-            "give other wavenumbers"
+            f"something seems to grow at kx = {kx:g}, ky = {ky:g} that the finest grids do not resolve, as happens "
+            f"in flows as cold as M/T = {_coldness(disturbances.flow):.2g}: take a warmer flow or other wavenumbers"
         )
     return found
+
+
+def _coldness(flow: Flow) -> float:
+    return flow.mass_holdup / flow.surface_temperature
 
 
 @dataclass(frozen=True, eq=False)
