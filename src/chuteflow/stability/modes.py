@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from chuteflow.errors import InputError, SolveError
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
-from chuteflow.stability.base import Base, Resolution, base
+from chuteflow.stability.base import Base, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -105,6 +105,14 @@ class Mode:
         out[-1] *= profile.granular_temperature
         velocity = out[ALONG:-1]
         return out / velocity.ravel()[np.abs(velocity).argmax()]
+
+    def sampled(self, points: int = 201) -> tuple[Array, Complex]:
+        """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
+        base_ = self.operator.base
+        s = grid(points - 1).nodes[::-1]
+        share, _ = shares(s, base_.resolution)
+        matrix = interpolation_matrix(base_.grid, s)
+        return self.flow.at_overburden(share).height, self.fields @ matrix.T
 
 
 def relative_fields(of: Operator, vector: Complex) -> Complex:
