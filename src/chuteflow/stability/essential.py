@@ -19,6 +19,7 @@ import numpy as np
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.stability.base import Base, Resolution, shares
+from chuteflow.steady.flow import Flow
 from chuteflow.theory.laws import law
 
 #: Points of the curve for each node of a grid.
@@ -27,9 +28,14 @@ _FINENESS = 6
 
 def relaxation(flow_base: Base) -> tuple[Array, Array]:
     """u and -Re sigma_c on a grid several times as fine as that of ``flow_base``."""
-    resolution, flow = flow_base.resolution, flow_base.flow
+    resolution = flow_base.resolution
     fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
-    profile = flow.at_overburden(shares(grid(fine.degree).nodes, fine)[0])
+    return relaxation_at(flow_base.flow, shares(grid(fine.degree).nodes, fine)[0])
+
+
+def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
+    """u and -Re sigma_c where ``share`` of the mass lies above."""
+    profile = flow.at_overburden(share)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, law(flow.chute.closure)
     g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
