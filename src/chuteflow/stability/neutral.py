@@ -58,6 +58,16 @@ class Scan:
     b: Array
     sigma: Complex
 
+    @property
+    def growth(self) -> Array:
+        """Re sigma."""
+        return np.array(np.real(self.sigma), dtype=float)
+
+    @property
+    def frequency(self) -> Array:
+        """-Im sigma."""
+        return np.array(-np.imag(self.sigma), dtype=float)
+
 
 @dataclass(frozen=True, eq=False)
 class NeutralCurve:
@@ -211,7 +221,8 @@ class _Eigenvalue:
 class _GrowthSystem:
     """Re sigma(z) = 0 for the mode that is ``sigma`` at ``begin``, followed from one point to the next.
 
-    Zero is the growth that counts as none: real rates that vanish do so at the end of the continuous spectrum.
+    A real rate that vanishes does so at the end of the continuous spectrum, of which a grid has points close below:
+    these are told from the mode by their slopes.
     """
 
     def __init__(self, plane: Plane, begin: Array, sigma: complex) -> None:
@@ -228,8 +239,7 @@ class _GrowthSystem:
         there = self._followed(z)
         if self._sure.same_mode(there):
             self._tried = there
-        none = self._plane.wave(z)[0].smallest_rate
-        return np.array([there.sigma.real - none]), np.real(there.slope)[None]
+        return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
 
     def judged(self, z: Array) -> _Neutral:
         """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""

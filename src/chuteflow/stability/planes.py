@@ -69,6 +69,10 @@ class FamilyPlane:
         """See :class:`chuteflow.stability.neutral.Plane`."""
         return 1.0, 1.0
 
+    def named(self, z: Array) -> Array:
+        """k h and the place along the family at points z (n, 2)."""
+        return np.stack([np.exp(self.low + self.unit * z[:, 0]), z[:, 1]], axis=1)
+
     def flow(self, place: float) -> Flow:
         """The flow at a place between 0 and 1 along the family, or a little outside."""
         return self._at(place).flow
@@ -185,8 +189,8 @@ def wave_map(
         flow,
         low[0] + unit[0] * scan.a,
         low[1] + unit[1] * scan.b,
-        np.real(scan.sigma),
-        -np.imag(scan.sigma),
+        scan.growth,
+        scan.frequency,
         tuple(scaled),
     )
 
@@ -228,10 +232,12 @@ def family_map(
         flows=tuple(plane.flow(float(place)) for place in scan.b),
         angle=angle,
         depth_wavenumber=np.exp(low + (high - low) * scan.a),
-        growth=np.real(scan.sigma),
-        frequency=-np.imag(scan.sigma),
+        growth=scan.growth,
+        frequency=scan.frequency,
         neutral=tuple(
-            replace(c, z=np.stack([np.exp(low + (high - low) * c.z[:, 0]), c.z[:, 1]], axis=1), error=c.error * plane.unit)
+            replace(
+                c, z=np.stack([np.exp(low + (high - low) * c.z[:, 0]), c.z[:, 1]], axis=1), error=c.error * plane.unit
+            )
             for c in curves
         ),
         neutral_flows=tuple(tuple(plane.flow(float(place)) for place in c.z[:, 1]) for c in curves),
