@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from chuteflow.analysis.curve import curve
+    from chuteflow.analysis.domains.maps import Domain, domain
     from chuteflow.analysis.enumeration import flows
     from chuteflow.analysis.hot import HotModel, hot
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
@@ -24,6 +25,7 @@ _HOMES = {
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "analysis.results",
+    "Domain": "analysis.domains.maps",
     "Flow": "steady.flow",
     "FlowSet": "analysis.results",
     "InputError": "errors",
@@ -36,6 +38,7 @@ _HOMES = {
     "SpecialPoint": "analysis.results",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
+    "domain": "analysis.domains.maps",
     "flows": "analysis.enumeration",
     "hot": "analysis.hot",
     "load": "faces.files",
@@ -48,6 +51,7 @@ __all__ = [
     "Chute",
     "ChuteflowError",
     "Curve",
+    "Domain",
     "Flow",
     "FlowSet",
     "HotModel",
@@ -60,6 +64,7 @@ __all__ = [
     "SpecialPoint",
     "__version__",
     "curve",
+    "domain",
     "flows",
     "hot",
     "load",

@@ -71,6 +71,8 @@ class Base:
 
 #: Order of the fields of a fan.
 FIELDS = HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST = range(7)
+#: Order of what ``down`` and ``across`` of a fan hold the derivatives of.
+DERIVED = EXCESS, GRIPPED, OF_FLUX, OF_SLIP, OF_GLIDE = range(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,8 @@ class Fan:
     end. The other arrays are (K, C): ``excess`` is y - s^2 shear and ``grip`` G; ``log_mass`` is ln M. ``fields``
     (7, K, C) are by the names of FIELDS y; ln M; the logarithm of M sqrt(T), which times F1 is the flux at the slip
     velocity; that of the flux by shear; the least and the largest net loss, and the largest v so far down.
+    ``down`` and ``across`` (5, K, C) are the derivatives of y - s^2 shear, G and three of the fields, by the names
+    of DERIVED, to the logarithm of p and from column to column, to a positive factor at each point.
     ``spacing`` is that of ln T for a gap of 1.
     """
 
@@ -93,6 +97,8 @@ class Fan:
     grip: Array
     log_mass: Array
     fields: Array
+    down: Array
+    across: Array
     spacing: float
 
     def of_base(self, base: Base) -> Array:
@@ -367,38 +373,70 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     slope = problem.slope
     closures = _table(problem)
     net = closures[LOSS] - slope**2 * closures[WORK]
-    fields = np.stack([*closures[[SHEAR, GRIP, WORK, GAMMA]], net, 1.0 / closures[CONDUCTION]])
-    shear, grip, work, gamma, net, inverse = _interpolated(_with_increments(fields), big_l)
+    wanted = [*closures[[SHEAR, GRIP]], *np.gradient(closures[[SHEAR, GRIP]], axis=1) * _SCALE]
+    wanted += [*closures[[WORK, GAMMA, COUPLING]], net, 1.0 / closures[CONDUCTION]]
+    shear, grip, shear_slope, grip_slope, work, gamma, k, net, inverse = _interpolated(
+        _with_increments(np.stack(wanted)), big_l
+    )
     over = p - problem.surface_stress
-    root_t = np.exp(0.5 * (np.log(p) + gamma - big_l))
-    rate = slope * over * work * root_t  # of the flux by shear, in p
+    log_root_t = 0.5 * (np.log(p) + gamma - big_l)
+    rate = slope * over * work * np.exp(log_root_t)  # of the flux by shear, in p
     glide = 0.5 * rate * over
     below = grown.thin
     turn = p * y * inverse
     pace = p * _advance(p, turn, grown.p1)
     glide[below:] = glide[below] + _running((rate * pace)[below:], tau[below:])
-    log_mass = np.log(over)
+    glide = np.maximum(glide, np.finfo(float).tiny)
+    excess, log_mass = y - slope**2 * shear, np.log(over)
+    log_slip, log_glide = log_mass + log_root_t, np.log(glide)
+    still = 1.0 - turn
+    warming = turn + k * still  # d ln T
+    cooling = p * net - y * (1.0 + 0.5 * warming)  # dy
+    down = [cooling - slope**2 * shear_slope * still, grip_slope * still, cooling]
+    down += [p / over + 0.5 * warming, rate * p / glide]
     return Fan(
         slope=slope,
         gaps=grown.gaps,
         place=columns,
         last=len(p) - 1 - (np.diff(tau[::-1], axis=0) > 0.0).argmax(axis=0),
-        excess=y - slope**2 * shear,
+        excess=excess,
         grip=grip,
         log_mass=log_mass,
         fields=np.stack(
             [
                 y,
                 log_mass,
-                log_mass + np.log(root_t),
-                np.log(np.maximum(glide, np.finfo(float).tiny)),
+                log_slip,
+                log_glide,
                 np.minimum.accumulate(net, axis=0),
                 np.maximum.accumulate(net, axis=0),
                 np.maximum.accumulate(turn, axis=0),
             ]
         ),
+        down=np.stack(down),
+        across=_across(np.stack([excess, grip, y, log_slip, log_glide]), grown.gaps, big_l),
         spacing=spacing,
     )
+
+
+def _across(values: Array, gaps: Array, big_l: Array) -> Array:
+    """Derivatives of ``values`` (..., C) from column to column, to a positive factor for each column.
+
+    Of fourth order between evenly spaced neighbours that have not parted, else of second.
+    """
+    unit = np.minimum(gaps[1:], gaps[:-1])
+    behind, ahead = gaps[:-1] / unit, gaps[1:] / unit
+    steps = np.diff(values, axis=-1)
+    out = np.empty_like(values)
+    out[..., 1:-1] = (steps[..., :-1] * (ahead / behind) + steps[..., 1:] * (behind / ahead)) / (ahead + behind)
+    out[..., 0] = 2.0 * steps[..., 0] - out[..., 1] * behind[0]
+    out[..., -1] = 2.0 * steps[..., -1] - out[..., -2] * ahead[-1]
+    even = np.flatnonzero((gaps[:-3] == gaps[1:-2]) & (gaps[1:-2] == gaps[2:-1]) & (gaps[2:-1] == gaps[3:]))
+    near = np.abs(big_l[:, even + 4] - big_l[:, even]) < 3.0 * _APART
+    inner = steps[..., even + 1] + steps[..., even + 2]
+    fine = (8.0 * inner - (inner + steps[..., even] + steps[..., even + 3])) / 12.0
+    out[..., even + 2] = np.where(near, fine, out[..., even + 2])
+    return out
 
 
 def _running(rate: Array, tau: Array) -> Array:
