@@ -104,11 +104,15 @@ def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: f
     """Where to classify a new column: evenly at ``guards`` shares, and around the stops that those ``nearby`` (up
     to two to either side, ascending) lead to expect."""
     shares = [(i + 0.5) / guards for i in range(guards)]
-    # A little more than the tolerance apart would be halved once more.
-    aside = 0.49 * tolerance
-    for parts in zip(*(one.parts for one in nearby), strict=True):
-        for stop in _expected(place, [one.place for one in nearby], parts):
-            shares += [stop - aside, stop + aside]
+    places = [one.place for one in nearby]
+    each = zip(*(one.parts for one in nearby), strict=True)
+    last = -1.0
+    for stop in sorted(stop for parts in each for stop in _expected(place, places, parts)):
+        # Numbers that change together are expected to do so at nearly the same stop.
+        if stop - last > 0.5 * tolerance:
+            # A little more than the tolerance apart would be halved once more.
+            shares += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
+            last = stop
     return shares
 
 

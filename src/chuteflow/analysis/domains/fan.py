@@ -45,9 +45,11 @@ _SCALE = (_ENTRIES - 1) / (_HIGH - _LOW)
 #: Trajectories end hot below this density x, and cold with y below this multiple of its scale.
 _LOG_EMPTY, _COLD = math.log(1e-6), 4.0
 #: Neighbours part where they differ by more in L, as far as that matters to a base, or in y.
-_APART, _APART_IN_FLUX, _DILUTE = 0.45, 0.2, math.log(3e-3)
+_APART, _APART_IN_FLUX, _DILUTE = 0.65, 0.3, math.log(3e-3)
 _FEWEST, _MOST_COLUMNS = 24, 3000
 _SAME_COLUMN = 1e-6
+#: Derivatives through five columns are taken where gaps differ by less than this factor.
+_EVEN = 12.0
 #: Columns nearer than this have surface temperatures that rounding makes too much alike.
 _SMALLEST_GAP = 1e-8
 
@@ -422,21 +424,36 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
 def _across(values: Array, gaps: Array, big_l: Array) -> Array:
     """Derivatives of ``values`` (..., C) from column to column, to a positive factor for each column.
 
-    Of fourth order between evenly spaced neighbours that have not parted, else of second.
+    Through five columns where they have not parted and their gaps are not too uneven, else through three.
     """
-    unit = np.minimum(gaps[1:], gaps[:-1])
-    behind, ahead = gaps[:-1] / unit, gaps[1:] / unit
-    steps = np.diff(values, axis=-1)
-    out = np.empty_like(values)
-    out[..., 1:-1] = (steps[..., :-1] * (ahead / behind) + steps[..., 1:] * (behind / ahead)) / (ahead + behind)
-    out[..., 0] = 2.0 * steps[..., 0] - out[..., 1] * behind[0]
-    out[..., -1] = 2.0 * steps[..., -1] - out[..., -2] * ahead[-1]
-    even = np.flatnonzero((gaps[:-3] == gaps[1:-2]) & (gaps[1:-2] == gaps[2:-1]) & (gaps[2:-1] == gaps[3:]))
-    near = np.abs(big_l[:, even + 4] - big_l[:, even]) < 3.0 * _APART
-    inner = steps[..., even + 1] + steps[..., even + 2]
-    fine = (8.0 * inner - (inner + steps[..., even] + steps[..., even + 3])) / 12.0
-    out[..., even + 2] = np.where(near, fine, out[..., even + 2])
-    return out
+    count = len(gaps) + 1
+    out = _through(values, gaps, 3)[0]
+    first = np.clip(np.arange(count) - 2, 0, count - 5)
+    fine, widths = _through(values, gaps, 5)
+    even = (widths > 1.0 / _EVEN).all(axis=0) & (widths < _EVEN).all(axis=0)
+    near = np.abs(big_l[:, first + 4] - big_l[:, first]) < 3.0 * _APART
+    return np.where(even & near, fine, out)
+
+
+def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
+    """Derivatives of ``values`` (..., C) at columns by polynomials through ``points`` of them, in units of a gap of
+    each, and the gaps in these units (points - 1, C)."""
+    count = len(gaps) + 1
+    here = np.arange(count)
+    first = np.clip(here - points // 2, 0, count - points)
+    widths = gaps[first + np.arange(points - 1)[:, None]] / gaps[np.minimum(here, count - 2)]
+    at = np.concatenate([np.zeros((1, count)), np.cumsum(widths, axis=0)])
+    off = at[here - first, here] - at
+    out = np.zeros_like(values)
+    for j in range(points):
+        others = [k for k in range(points) if k != j]
+        own = here - first == j
+        # The factor of the column itself is left out of the product; at the column the weight is the sum of 1/off.
+        product = np.prod([np.where(here - first == k, 1.0, off[k]) for k in others], axis=0)
+        weight = product / np.prod([at[j] - at[k] for k in others], axis=0)
+        weight[own] = np.sum([1.0 / off[k][own] for k in others], axis=0)
+        out += weight * values[..., first + j]
+    return out, widths
 
 
 def _running(rate: Array, tau: Array) -> Array:

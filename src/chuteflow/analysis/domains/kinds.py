@@ -228,8 +228,6 @@ def _zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> Array:
     """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q, where ``rise`` changes
     sign."""
-    from scipy.interpolate import CubicSpline
-
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
     log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
@@ -237,10 +235,37 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
     stops = log_q[[0, -1]]
     if before.size:
         turns = at[before] + (at[before + 1] - at[before]) * rise[before] / (rise[before] - rise[before + 1])
-        turned = CubicSpline(at, log_q)(turns) if len(at) > 3 else np.interp(turns, at, log_q)
-        stops = np.concatenate([log_q[:1], turned, log_q[-1:]])
+        if len(at) > 3:
+            around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
+            turned = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
+        else:
+            turned = np.interp(turns, at, log_q)
+        along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
+        first = along if rise[0] > 0.0 else -along
+        stops = np.array(_confirmed([log_q[0], *turned, log_q[-1]], first))
     ends = np.stack([stops[:-1], stops[1:]], axis=1)
     return np.sort(ends, axis=1)
+
+
+def _confirmed(stops: list[float], rises: float) -> list[float]:
+    """Values at the ends and turns of a family without those turns between which it does not turn.
+
+    It ``rises`` first (1), or falls (-1), and so on in turn.
+    """
+    stops = list(stops)
+    i = 0
+    while len(stops) > 2 and i < len(stops) - 1:
+        if (stops[i + 1] - stops[i]) * rises * (-1.0) ** i > _TURN:
+            i += 1
+        elif i == 0:
+            del stops[1]
+            rises = -rises
+        elif i == len(stops) - 2:
+            del stops[i]
+        else:
+            del stops[i : i + 2]
+            i -= 1
+    return stops
 
 
 def _most(pieces: Array) -> int:

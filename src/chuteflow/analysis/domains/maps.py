@@ -29,7 +29,7 @@ from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 
 #: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
-TOLERANCE, FINEST, COARSEST = 1e-3, 1e-6, 0.1
+TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
 #: Places along a column that are always looked at: at first, and later.

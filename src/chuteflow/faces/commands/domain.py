@@ -61,7 +61,7 @@ class Numbers(click.ParamType):
 @options.option("--size", type=Size(), help="Cells along x and y; 400x400 by default.")
 @options.option("--temperature", type=Numbers(), help="Surface temperatures at which to look for flows, as 1,10,100.")
 @options.option(
-    "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.001 by default."
+    "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
 @options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
