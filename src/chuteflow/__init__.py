@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
     from chuteflow.faces.files import load, save
+    from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
@@ -36,6 +37,7 @@ _HOMES = {
     "Searched": "analysis.results",
     "SolveError": "errors",
     "SpecialPoint": "analysis.results",
+    "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
     "domain": "analysis.domains.maps",
@@ -43,6 +45,7 @@ _HOMES = {
     "hot": "analysis.hot",
     "load": "faces.files",
     "save": "faces.files",
+    "stability_of": "stability.verdict",
 }
 
 __all__ = [
@@ -62,6 +65,7 @@ __all__ = [
     "Searched",
     "SolveError",
     "SpecialPoint",
+    "Stability",
     "__version__",
     "curve",
     "domain",
@@ -69,6 +73,7 @@ __all__ = [
     "hot",
     "load",
     "save",
+    "stability_of",
 ]
 
 
