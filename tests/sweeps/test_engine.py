@@ -4,24 +4,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
-from chuteflow.analysis.ranges import SURFACE_TEMPERATURE
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps import engine
+from chuteflow.sweeps.batch import Batch
 from chuteflow.sweeps.engine import solve_chunk
+from chuteflow.sweeps.marching import start
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import Reason, Status
 from chuteflow.sweeps.study import CHUTE, from_dict
+from chuteflow.theory.boundary import surface_stress
 from chuteflow.theory.laws import LAWS
 
 VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0.3, 1e3)}
 MACROSCOPIC = ("mass_flux", "centre_of_mass", "mass_holdup")
 PAPER = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
-#: Flows nearer than this to the edge of the range asked for may lie on either side of it.
-EDGE = 0.05
 
 
 def random_study(condition, points, seed):
@@ -50,28 +51,59 @@ def chute_of(chunk, i):
     return Chute(*(float(p[name][i]) for name in CHUTE), *words)
 
 
-def assert_same_flows(chunk, i, found, condition):
-    kept = {name: values[i, : chunk.n_flows[i]] for name, values in chunk.quantities.items()}
-    assert np.isnan(chunk.error[i, chunk.n_flows[i] :]).all()
-    temperature = np.array([flow.surface_temperature for flow in found])
-    if condition != "T_surface" and len(found) != chunk.n_flows[i]:
-        # Beyond the range asked for families are followed towards the value, from its edge on.
-        low, high = SURFACE_TEMPERATURE[0] * np.exp(EDGE), SURFACE_TEMPERATURE[1] * np.exp(-EDGE)
-        ours, theirs = kept["surface_temperature"], temperature
-        found = [flow for flow, t in zip(found, theirs, strict=True) if low < t < high]
-        inside = (ours > low) & (ours < high)
-        assert np.abs(len(ours) - len(theirs)) == 1
-        assert all(np.abs(np.log(ours[~inside] / SURFACE_TEMPERATURE[1])) < EDGE)
-        kept = {name: values[inside] for name, values in kept.items()}
-    assert len(found) == len(kept["mass_flux"]), chute_of(chunk, i)
-    for k, flow in enumerate(found):
-        allowed = chunk.error[i, k] + flow.error
+def bases_below(chute, temperature, stress):
+    """Normal stresses down to ``stress`` at which the trajectory of a surface temperature meets the base,
+    by another program of integration."""
+    one = Batch.of(
+        chute.closure,
+        chute.surface,
+        *(np.array([x]) for x in (chute.slope, chute.restitution, chute.wall_restitution, chute.roughness)),
+    )
+
+    def along(log_p, state):
+        rows = np.array([[log_p], [state[0]], [state[1]], [0.0], [0.0], [0.0]])
+        return one.along(rows), rows
+
+    def rate(log_p, state):
+        at, rows = along(log_p, state)
+        out = np.empty_like(rows)
+        at.derivative(rows, out)
+        return out[1:3, 0]
+
+    def excess(log_p, state):
+        at, _ = along(log_p, state)
+        return (at.y - at.base_flux)[0]
+
+    first = start(one, np.array([temperature]), np.ones(1), 1e-8)[0][:, 0]
+    solved = solve_ivp(
+        rate, (first[0], np.log(stress)), first[1:3], method="DOP853", events=excess, rtol=1e-11, atol=1e-13
+    )
+    return np.exp(solved.t_events[0])
+
+
+def assert_same_flows(chunk, i, found):
+    """That all ``found`` are among the flows of point ``i``; returns how many more these are, all of them real."""
+    chute, many = chute_of(chunk, i), int(chunk.n_flows[i])
+    kept = {name: values[i, :many] for name, values in chunk.quantities.items()}
+    assert np.isnan(chunk.error[i, many:]).all()
+    assert (np.diff(kept["surface_temperature"]) <= 0.0).all()
+    left = set(range(many))
+    for flow in found:
+        apart = [abs(np.log(kept["mass_holdup"][k] / flow.mass_holdup)) for k in sorted(left)]
+        assert apart, chute
+        k = sorted(left)[int(np.argmin(apart))]
+        left.remove(k)
         for name in MACROSCOPIC:
-            assert abs(np.log(kept[name][k] / getattr(flow, name))) <= allowed, (chute_of(chunk, i), name)
+            assert abs(np.log(kept[name][k] / getattr(flow, name))) <= chunk.error[i, k] + flow.error, (chute, name)
         for name in NUMBERS:
-            assert kept[name][k] == pytest.approx(getattr(flow, name), rel=1e-5), (chute_of(chunk, i), name)
+            assert kept[name][k] == pytest.approx(getattr(flow, name), rel=1e-5), (chute, name)
         for name, words in KINDS.items():
             assert words[kept[name][k]] == getattr(flow, name)
+    for k in left:
+        stress = kept["mass_holdup"][k] + surface_stress(chute.surface)
+        bases = bases_below(chute, kept["surface_temperature"][k], 1.01 * stress)
+        assert np.abs(np.log(bases / stress)).min() < 1e-7, (chute, k)
+    return len(left)
 
 
 def compare(condition, points, seed):
@@ -80,15 +112,17 @@ def compare(condition, points, seed):
     assert (chunk.status == Status.COMPLETE).all()
     assert ((chunk.reason == Reason.HAS_FLOWS) == (chunk.n_flows > 0)).all()
     assert (chunk.error[chunk.error > 0] <= study.tolerance).all()
+    more = 0
     for i in range(points):
         value = float(chunk.parameters[condition][i])
-        assert_same_flows(chunk, i, flows(chute_of(chunk, i), **{condition: value}), condition)
-    return chunk
+        more += assert_same_flows(chunk, i, flows(chute_of(chunk, i), **{condition: value}))
+    return chunk, more
 
 
 @pytest.mark.parametrize(("condition", "points"), [("T_surface", 20), ("Q", 10), ("M", 12), ("h", 5)])
 def test_flows_are_those_of_the_search_of_one_chute(condition, points):
-    chunk = compare(condition, points, 1)
+    chunk, more = compare(condition, points, 1)
+    assert more == 0
     assert chunk.n_flows.max() > 0
     assert chunk.n_flows.min() == 0
 
@@ -97,7 +131,9 @@ def test_flows_are_those_of_the_search_of_one_chute(condition, points):
 @pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.parametrize("condition", VALUES)
 def test_flows_of_several_hundred_chutes_are_those_of_the_search_of_one(condition, seed):
-    chunk = compare(condition, 200, seed)
+    chunk, more = compare(condition, 200, seed)
+    # A deep flow in a hundred, or one beside the edge of the range, is not seen by the search of one chute.
+    assert more <= 2
     # So many are searched together that the speed is not that of the search of one.
     assert chunk.singly <= 20
 
@@ -119,6 +155,24 @@ def test_flows_that_do_not_fit_are_counted_and_told():
     assert chunk.n_flows[0] == 3
     assert chunk.status[0] == Status.MORE_FLOWS_THAN_KEPT
     assert chunk.quantities["surface_temperature"][0] == pytest.approx([7.34, 2.54], rel=3e-3)
+
+
+def test_a_trajectory_that_grows_dense_again_is_followed_to_its_base():
+    """Where the interior gains energy in the end, a thin layer at the surface does not last."""
+    parameters = {
+        "slope": 0.2213994162803735,
+        "e": 0.957297110925067,
+        "ew": 0.5275460577362433,
+        "roughness": 0.8356708485326632,
+        "surface": "interface",
+        "closure": "lun-fourier",
+        "T_surface": 231.19075660434729,
+    }
+    chunk = solve_chunk(from_dict({"design": {"kind": "list"}, "parameters": parameters}, Path()), 0)
+    assert chunk.n_flows[0] == 1
+    stress = chunk.quantities["mass_holdup"][0, 0] + surface_stress("interface")
+    bases = bases_below(chute_of(chunk, 0), parameters["T_surface"], 12.0)
+    assert bases == pytest.approx([stress], rel=1e-8)
 
 
 def test_what_is_no_chute_is_told_and_stops_nothing():
