@@ -61,8 +61,10 @@ const askFlows = () => asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, m
 const askCurve = () => asks.curve.ask({ ...chute(), ...grains() }, mark);
 
 onChange((has) => {
-  if (has("theme")) document.documentElement.dataset.theme = state.theme;
-  forgetColours();
+  if (has("theme")) {
+    document.documentElement.dataset.theme = state.theme;
+    forgetColours();
+  }
   showControls();
   const words = has("si", "d", "rho");
   if (ofChute(has) || has("Q") || words) askFlows();
