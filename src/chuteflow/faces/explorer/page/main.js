@@ -57,7 +57,10 @@ function measured(name, since) {
   requestAnimationFrame(() => setTimeout(() => performance.measure(`${name}-redraw`, { start: since, end: performance.now() })));
 }
 
-const askFlows = () => asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
+function askFlows() {
+  stability.stop();
+  asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
+}
 const askCurve = () => asks.curve.ask({ ...chute(), ...grains() }, mark);
 
 onChange((has) => {
