@@ -13,7 +13,7 @@ export function drawProfiles(list, top, chosen) {
   for (const [symbol, words, letter] of panels) {
     const svg = byId(`profile-${symbol}`), s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
     const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
-    const largest = Math.max(1e-12, ...list.flatMap((flow) => flow.profile[symbol])) * s;
+    const largest = list.length ? Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s : 1;
     draw(svg, {
       x: { low: 0, high: largest * 1.05, label },
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
