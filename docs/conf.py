@@ -17,7 +17,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",
     "docstrings",
     "equations",
@@ -25,10 +24,12 @@ extensions = [
     "commands",
     "tables",
     "pictures",
+    "present",
+    "offline",
 ]
+if "quick" not in tags:  # noqa: F821, Sphinx gives it
+    extensions.append("sphinx.ext.viewcode")
 exclude_patterns = ["_ext"]
-# Pages of a subject are gathered by patterns, and a subject may have none.
-suppress_warnings = ["toc.empty_glob"]
 
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3

@@ -1,12 +1,13 @@
 """Docstrings are plain text with a few roles: keep what they mean from being read as markup.
 
 Formulas such as |lambda| < 1, 2 * x or lambda_ hold characters that reStructuredText has other plans for, and
-an indented formula is to stay as it is set.
+an indented formula is to stay as it is set. The number of an equation becomes a link to where it stands.
 """
 
 import re
 from typing import Any
 
+from equations import NUMBER, numbered
 from sphinx.application import Sphinx
 
 #: Literals and roles, which stay as they are.
@@ -17,10 +18,15 @@ _SECTION = re.compile(r"(Args|Raises|Returns|Yields):$")
 
 
 def escaped(line: str) -> str:
-    """The line with the special characters outside of literals and roles escaped."""
+    """The line with the special characters outside of literals and roles escaped, and equations linked."""
     parts = _MARKUP.split(line)
-    parts[::2] = [_SPECIAL.sub(r"\\\1", part) for part in parts[::2]]
+    parts[::2] = [linked(_SPECIAL.sub(r"\\\1", part), ":eqn:`{}`") for part in parts[::2]]
     return "".join(parts)
+
+
+def linked(text: str, role: str) -> str:
+    """The text with the equations that it names as links, in the markup ``role``."""
+    return NUMBER.sub(lambda match: role.format(numbered(match)), text)
 
 
 def marked_up(lines: list[str]) -> list[str]:

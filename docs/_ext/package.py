@@ -12,6 +12,11 @@ import chuteflow
 class FromPackage(SphinxDirective):
     """A directive whose result depends on the code of the package."""
 
+    @property
+    def quick(self) -> bool:
+        """Whether this is a build that leaves out what takes long."""
+        return "quick" in self.env.app.tags
+
     def note_package(self) -> None:
         """Let the page depend on every module."""
         for path in Path(chuteflow.__file__).parent.rglob("*.py"):
