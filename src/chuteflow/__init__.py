@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
     from chuteflow.faces.files import load, save
+    from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
@@ -34,12 +35,14 @@ _HOMES = {
     "Searched": "analysis.results",
     "SolveError": "errors",
     "SpecialPoint": "analysis.results",
+    "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
     "flows": "analysis.enumeration",
     "hot": "analysis.hot",
     "load": "faces.files",
     "save": "faces.files",
+    "stability_of": "stability.verdict",
 }
 
 __all__ = [
@@ -58,12 +61,14 @@ __all__ = [
     "Searched",
     "SolveError",
     "SpecialPoint",
+    "Stability",
     "__version__",
     "curve",
     "flows",
     "hot",
     "load",
     "save",
+    "stability_of",
 ]
 
 

@@ -12,7 +12,7 @@ has, are looked at more closely. Nothing of a lane depends on the lanes beside i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -25,8 +25,10 @@ from chuteflow.sweeps.zeros import zeros
 Event = Callable[[Along, Indices], Array]
 
 #: Lanes treated at once: so many that the interpreter does not count, so few that they fit the cache.
-LANES = 8192
-_EMPTY, _DENSE = float(np.log(1e-6)), 60.0
+LANES = 16384
+_DENSE = 60.0
+#: Densities X below which a lane may end as an empty one: the first of them at which that can be told.
+_THIN = (1e-2, 1e-3, 1e-6)
 _COLD = 4.0
 _MOST_STEPS = 4000
 #: Parts of a step that is looked at more closely.
@@ -50,11 +52,12 @@ class Accuracy:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, empty
-    with a heat flux above ``ceiling``, beyond which none is met. ``turn`` is p_1."""
+    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, with
+    ln X below ``thin`` and a heat flux above ``ceiling``, beyond which none is met. ``turn`` is p_1."""
 
     deepest: Array
     floor: Array
+    thin: Array
     ceiling: Array
     turn: Array
     rate: Array
@@ -64,15 +67,39 @@ class Ends:
         """The ends of the lanes of ``batch`` at normal stresses ``deepest`` (n,)."""
         rate, balance = batch.pace()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
-        conduction, net, meets, _ = batch.at_density(np.full(len(batch), 1e-12))
-        # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux.
-        limit = np.sqrt(np.maximum(2.0 * net * conduction, 0.0))
-        ceiling = np.where(net > 0.0, np.where(meets > limit, 0.0, np.maximum(meets, 0.0)), np.inf)
-        return cls(deepest, floor, ceiling, 1.0 / np.maximum(rate, 1e-3), rate)
+        thin, ceiling = np.full(len(batch), -np.inf), np.full(len(batch), np.inf)
+        for x in _THIN:
+            highest = _hot_end(batch, x)
+            told = np.isinf(ceiling) & np.isfinite(highest)
+            thin[told], ceiling[told] = np.log(x), highest[told]
+        return cls(deepest, floor, thin, ceiling, 1.0 / np.maximum(rate, 1e-3), rate)
 
     def take(self, lanes: Indices) -> Ends:
         """The ends of ``lanes``."""
-        return Ends(self.deepest[lanes], self.floor[lanes], self.ceiling[lanes], self.turn[lanes], self.rate[lanes])
+        return Ends(*(part[lanes] for part in vars(self).values()))
+
+    def above(self, deepest: Array) -> Ends:
+        """The same, but no deeper than ``deepest`` (n,)."""
+        return replace(self, deepest=np.minimum(self.deepest, deepest))
+
+
+def _hot_end(batch: Batch, x: float) -> Array:
+    """The heat flux (n,) above which a lane that is emptier than X meets no base any more, infinite where that
+    cannot be told."""
+    empty, thin = (batch.at_density(np.full(len(batch), one)) for one in (1e-12, x))
+    # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux. Both are
+    # nearly straight in X so close to it, and lie between their ends, give or take as much again.
+    limit = _span(*(np.sqrt(2.0 * np.maximum(net, 0.0) * conduction) for conduction, net, _, _ in (empty, thin)))
+    meets = _span(empty[2], thin[2])
+    loses = (empty[1] > 0.0) & (thin[1] > 0.0)
+    over, under = loses & (meets[0] > limit[1]), loses & (meets[1] < limit[0])
+    return np.where(over, 0.0, np.where(under, np.maximum(meets[1], 0.0), np.inf))
+
+
+def _span(one: Array, other: Array) -> tuple[Array, Array]:
+    """Least and largest of two values, each by their distance further out."""
+    apart = np.abs(other - one)
+    return np.minimum(one, other) - apart, np.maximum(one, other) + apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +195,7 @@ def _march(
             p, y = np.exp(state[LOG_P]), state[FLUX]
             h = h_next
             done = (p >= edges.deepest) | (y < edges.floor) | (state[LOG_X] > _DENSE)
-            done |= (state[LOG_X] < _EMPTY) & (y > edges.ceiling) & (p > edges.turn)
+            done |= (state[LOG_X] < edges.thin) & (y > edges.ceiling) & (p > edges.turn)
             stuck = ~(h > 1e-9) | (count > _MOST_STEPS)
             trouble[lane[stuck & ~done]] = True
             done |= stuck

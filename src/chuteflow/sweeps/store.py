@@ -201,7 +201,8 @@ class Store:
                 _write(partial / name, self._encoded(variable, arrays[name]))
             text = json.dumps(vars(marker), allow_nan=False)
             _write(partial / "marker", text.encode())
-            for name, variable in variables(self.study).items():
+            # The status last: where that of a chunk is there, so is the rest.
+            for name, variable in sorted(variables(self.study).items(), key=lambda item: item[0] == "status"):
                 place = self.path / name / "c" / str(chunk)
                 if variable.by_flow:
                     place.mkdir(parents=True, exist_ok=True)
