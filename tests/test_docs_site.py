@@ -3,16 +3,16 @@
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-sys.path.insert(0, str(DOCS / "_ext"))
 
-import docstrings  # noqa: E402
-import equations  # noqa: E402
-import offline  # noqa: E402
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(DOCS / "_ext")
+    docstrings, equations, offline = map(import_module, ("docstrings", "equations", "offline"))
 
 #: The build in a process whose sockets lead nowhere.
 BUILD = """

@@ -1,5 +1,6 @@
 """Every example in the README and the documents runs as it stands, and prints what the page shows."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -8,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chuteflow import Chute, curve, flows, hot
-from chuteflow.faces import contract
+from chuteflow.faces.cli import main
 
 from .run_page import agree, examples
 
@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md"))]
 RUNNER = Path(__file__).with_name("run_page.py")
-PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 
 
 def name(page):
@@ -59,17 +58,21 @@ def names_in(value):
 
 
 @pytest.mark.parametrize(
-    "value",
+    "command",
     [
-        pytest.param(lambda: contract.flow_set_object(flows(PAPER, Q=3.0)), id="solve"),
-        pytest.param(
-            lambda: contract.curve_object(curve(PAPER, points=8, surface_temperature=(0.1, 10.0))), id="curve"
-        ),
-        pytest.param(lambda: hot(PAPER).as_dict(), id="hot"),
+        "solve {chute} --flux 3 --diameter 0.001 --density 2500",
+        "curve {chute} --points 8 --search-temperature 0.1:10",
+        "hot {chute}",
+        "boundary --slope 0.29:0.3 --e 0.8 --ew 0.8 --roughness 0.6 --samples 2 --search-temperature 0.1:10",
+        "claims --only slip-limit",
+        "relax {chute} --flux 3 --duration 1",
     ],
+    ids=lambda command: command.split()[0],
 )
-def test_the_page_on_json_has_every_name(value):
-    assert names_in(value()) - {"M_max"} <= documented_names()
+def test_the_page_on_json_has_every_name(command, capsys):
+    words = command.format(chute="--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6").split()
+    assert main([*words, "--json"]) == 0
+    assert names_in(json.loads(capsys.readouterr().out)) <= documented_names()
 
 
 # The runner itself
