@@ -58,7 +58,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     from chuteflow.faces.plots import write_figure
     from chuteflow.faces.writing import require_writable, written_beside
     from chuteflow.paper.data import csv_text
-    from chuteflow.paper.sources import source
+    from chuteflow.paper.sources import NOT_REACHED, source
 
     for path in names.values():
         require_writable(path, options.DRAWN)
@@ -72,8 +72,10 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
         unchanged = (
             f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
         )
+        lost = any(note.startswith(NOT_REACHED) for note in data.table().notes)
+        ends = "; the method does not reach all flows: see the notes in the data" if lost else ""
         took = f"{time.perf_counter() - begin:.1f} s"
-        click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}")
+        click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}{ends}")
 
 
 def directory(name: str) -> Path:
