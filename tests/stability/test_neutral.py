@@ -41,7 +41,7 @@ def circle(a, b, centre=(0.5, 0.5), radius=0.3):
 def test_a_closed_curve_is_followed_all_around():
     plane = KnownPlane(circle)
     (found,) = neutral_curves(plane, plane.scan(9))
-    assert found.ends == ("the curve closes on itself",) * 2
+    assert found.ends == ("its own beginning: it is closed",) * 2
     np.testing.assert_allclose(np.hypot(*(found.z - 0.5).T), 0.3, atol=1e-7)
     angles = np.unwrap(np.arctan2(*(found.z - 0.5).T))
     assert abs(angles[-1] - angles[0]) == pytest.approx(2.0 * np.pi, abs=0.05)

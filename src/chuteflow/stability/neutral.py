@@ -150,7 +150,7 @@ def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
     )
 
 
-_CLOSED = "the curve closes on itself"
+_CLOSED = "its own beginning: it is closed"
 
 
 def _side(
@@ -169,12 +169,12 @@ def _side(
             return out, "the edge of the range"
         judged = system.judged(point.z)
         if judged.error > _ASTRAY:
-            return out, "the mode runs into the continuous spectrum"
+            return out, "where the mode runs into the continuous spectrum"
         points.append(point)
         out.append(judged)
         if len(points) > 3 and closes(points[0], points[-2], points[-1]):
             return out[:-1], _CLOSED
-    return out, path.status.value
+    return out, f"a point from which it could not be followed ({path.status.name.lower().replace('_', ' ')})"
 
 
 def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:

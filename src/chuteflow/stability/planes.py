@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from chuteflow.analysis.crossings import Chord
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.stability.along import flow_between
 from chuteflow.stability.modes import Disturbances, check_wavenumbers
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
 from chuteflow.stability.verdict import leading, stability_of
@@ -86,14 +86,7 @@ class FamilyPlane:
 
     def _at(self, place: float) -> Disturbances:
         if place not in self._kept:
-            position = place * (len(self.flows) - 1)
-            i = int(np.clip(np.floor(position), 0, len(self.flows) - 2))
-            first, last = self.flows[i], self.flows[i + 1]
-            sigma = position - i
-            if sigma in (0.0, 1.0):
-                flow = last if sigma else first
-            else:
-                flow = Flow(first.chute, Chord(first.solution, last.solution).at(sigma))
+            flow = flow_between(self.flows, place * (len(self.flows) - 1))
             self._kept[place] = Disturbances(flow)
             if len(self._kept) > _KEPT:
                 self._kept.popitem(last=False)

@@ -93,6 +93,7 @@ def _report(found: FamilyMap) -> Iterator[str]:
         return
     for number, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True), 1):
         yield f"neutral curve {number}, {len(flows)} points, error of ln(k h) at most {curve.error.max():.0e}"
+        yield f"it begins at {curve.ends[0]}, and ends at {curve.ends[1]}"
         yield tables.table([["k h", "Q", "h", "T_surface"], *_rows(curve.z[:, 0].tolist(), flows)])
         yield ""
 
