@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 from chuteflow.analysis.domains.columns import column
 from chuteflow.analysis.domains.plane import CODES, Axis, Plane
@@ -19,20 +21,28 @@ _OF_BASE = ("ew", "roughness")
 
 
 @dataclass(frozen=True)
-class MapColumn:
-    """Classes along the axis ``inner`` where ``outer`` is ``at``; both are names of a query.
+class Part:
+    """One number of the class along a column: ``values`` has one entry more than ``stops``, the values of the
+    parameter, ascending, between them."""
 
-    ``codes`` (integers in the order of ``names``) has one entry more than ``stops``, the values of ``inner``,
-    ascending, between them; ``tolerance`` is how far these may be off.
+    stops: tuple[float, ...]
+    values: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class MapColumn:
+    """What chutes are like along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
+
+    ``parts`` are by name "most" (flows that share a flux), "families", "interior" and "density" (bits, see
+    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature).
+    ``tolerance`` is how far stops may be off.
     """
 
     outer: str
     inner: str
     at: float
-    stops: tuple[float, ...]
-    codes: tuple[tuple[int, ...], ...]
+    parts: dict[str, Part]
     tolerance: float
-    names: tuple[str, ...] = CODES
 
 
 def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
@@ -45,14 +55,20 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
     found = column(plane, place, [(i + 0.5) / _FIRST for i in range(_FIRST)], tolerance)
+    stops = [float(plane.inner.at(stop)) for stop in found.stops]
     return MapColumn(
         outer,
         inner,
         float(plane.outer.at(place)),
-        tuple(float(plane.inner.at(stop)) for stop in found.stops),
-        found.codes,
+        {name: _part(stops, [code[i] for code in found.codes]) for i, name in enumerate(CODES)},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
+
+
+def _part(stops: Sequence[float], values: Sequence[int]) -> Part:
+    """Without the stops at which nothing changes."""
+    kept = [i for i, pair in enumerate(pairwise(values)) if pair[0] != pair[1]]
+    return Part(tuple(stops[i] for i in kept), (values[0], *(values[i + 1] for i in kept)))
 
 
 @lru_cache(maxsize=8)
