@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
+from functools import lru_cache, partial
 
-from chuteflow.analysis.domains.columns import column
-from chuteflow.analysis.domains.plane import CODES, Axis, Plane
+from chuteflow.analysis.domains.columns import Part, column
+from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
+from chuteflow.analysis.domains.plane import CODES, HOT_CODES, Axis, Code, Plane, code, hot_code
 from chuteflow.faces.contract import PARAMETERS
 from chuteflow.faces.explorer.queries import CONTROLS
 from chuteflow.steady.chute import Chute
 
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
-#: where every point has trajectories of its own.
-_FIRST = 9
-_TOLERANCE = {True: 0.008, False: 0.016}
+#: where every point has trajectories of its own, finer for what is known in closed form.
+_FIRST, _FIRST_HOT = 9, 33
+_TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 _OF_BASE = ("ew", "roughness")
-
-
-@dataclass(frozen=True)
-class Part:
-    """One number of the class along a column: ``values`` has one entry more than ``stops``, the values of the
-    parameter, ascending, between them."""
-
-    stops: tuple[float, ...]
-    values: tuple[int, ...]
+#: What a column tells of the flows: how many share a flux, the number of families, and bits of the kinds that occur.
+_TOLD = ("most", "families", "interior", "density")
 
 
 @dataclass(frozen=True)
@@ -34,8 +26,8 @@ class MapColumn:
     """What chutes are like along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
 
     ``parts`` are by name "most" (flows that share a flux), "families", "interior" and "density" (bits, see
-    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature).
-    ``tolerance`` is how far stops may be off.
+    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature). Their
+    stops are values of ``inner``, which may be off by ``tolerance``.
     """
 
     outer: str
@@ -54,24 +46,38 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
     plane = _plane(chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
-    found = column(plane, place, [(i + 0.5) / _FIRST for i in range(_FIRST)], tolerance)
-    stops = [float(plane.inner.at(stop)) for stop in found.stops]
+    told = column(place, partial(_told, plane), _evenly(_FIRST), tolerance).parts
+    # Narrower bands are where the search happened to meet them.
+    parts = {name: part.without_bands(tolerance) for name, part in zip(_TOLD, told, strict=True)}
+    parts["hot"] = _hot(plane, place)
     return MapColumn(
         outer,
         inner,
         float(plane.outer.at(place)),
-        {name: _part(stops, [code[i] for code in found.codes]) for i, name in enumerate(CODES)},
+        {name: Part(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
-
-
-def _part(stops: Sequence[float], values: Sequence[int]) -> Part:
-    """Without the stops at which nothing changes."""
-    kept = [i for i, pair in enumerate(pairwise(values)) if pair[0] != pair[1]]
-    return Part(tuple(stops[i] for i in kept), (values[0], *(values[i + 1] for i in kept)))
 
 
 @lru_cache(maxsize=8)
 def _plane(chute: Chute, x: str, y: str) -> Plane:
     across, up = (Axis(PARAMETERS[name], CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
     return Plane(across, up, chute, ())
+
+
+def _told(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of a point of the map by _TOLD."""
+    found = dict(zip(CODES, code(plane, outer, inner), strict=True))
+    kinds = (sum(bit for name, bit in bits.items() if found[name]) for bits in (INTERIORS, DENSITIES))
+    return (found["most"], found["families"], *kinds)
+
+
+def _hot(plane: Plane, place: float) -> Part:
+    """Where hot flows exist; the theory knows the half-line alone."""
+    if plane.chute.surface != "free":
+        return Part((), (0,))
+    return column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE).parts[HOT_CODES.index("hot")]
+
+
+def _evenly(count: int) -> list[float]:
+    return [(i + 0.5) / count for i in range(count)]
