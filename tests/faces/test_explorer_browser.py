@@ -136,6 +136,18 @@ def test_the_address_holds_the_state(page):
     again.close()
 
 
+def test_an_address_with_what_there_is_not(page):
+    opened(page, "?x=foo&y=bar&against=zz&shade=zz&theme=pink&flow=99")
+    for name, value in (("map-x", "slope"), ("map-y", "roughness"), ("against", "h"), ("shade", "most"), ("theme", "")):
+        expect(page.locator(f"#{name}")).to_have_value(value)
+    expect(page.locator("#flows input").nth(2)).to_be_checked()
+    opened(page, "?x=e&y=e")
+    expect(page.locator("#map-y")).to_have_value("roughness")
+    page.goto("/?slope=steep")
+    expect(page.locator("#failure")).to_contain_text("slope = 'steep': must be a number")
+    page.troubles.clear()  # the browser reports what the server refused
+
+
 def test_a_flow_is_chosen_by_its_point_and_by_the_keyboard(page):
     opened(page)
     page.locator("#curve .dot").nth(2).click()

@@ -16,7 +16,6 @@ const shadings = {
   density: { label: "density", says: "Densities among the flows", value: (bits) => bits, name: (bits) => ["no flow", "monotonic", "inverted", "both"][bits] },
   interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
 };
-const shading = () => (shadings[state.shade] ? state.shade : "most");
 // Columns to begin with, and how narrow the stretches between columns may become.
 const first = 8, finest = 64;
 let about = null, set = null, failure = "", shown = null, holding = false;
@@ -42,7 +41,7 @@ export function begin(given, setter) {
 /** After a change of the state: a new map where anything but the cross-hair moved. */
 export function changed(has) {
   for (const axis of ["x", "y"]) selects[axis].value = state[axis];
-  byId("shade").value = shading();
+  byId("shade").value = state.shade;
   // A cross-hair that moves asks nothing: one map serves all of its positions.
   const moved = has("x", "y", "surface", "closure") || names.some((name) => has(name) && name !== state.x && name !== state.y);
   if (moved || has("shade")) asking.begin();
@@ -80,7 +79,7 @@ function take(query, found, all) {
 
 /** What of a column is shaded. */
 function shaded({ parts }) {
-  const { stops, values } = parts[shading()], told = values.map(shadings[shading()].value);
+  const { stops, values } = parts[state.shade], told = values.map(shadings[state.shade].value);
   const kept = stops.map((_, i) => i).filter((i) => told[i] !== told[i + 1]);
   return { stops: kept.map((i) => stops[i]), values: [told[0], ...kept.map((i) => told[i + 1])] };
 }
@@ -153,7 +152,7 @@ export function redraw() {
     const { low, high, label, symbol } = about.controls[name];
     return { low, high, label: `${label.toLowerCase()} ${symbol.replace("_w", "w")}` };
   };
-  const { says, name } = shadings[shading()], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
+  const { says, name } = shadings[state.shade], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
   const shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
   shown = draw(svg, {
     x: axis(state.x), y: axis(state.y),
