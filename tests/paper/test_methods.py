@@ -1,5 +1,7 @@
 """Figures by either method: the flows agree, and where the paper's method ends is said."""
 
+import sys
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -223,10 +225,28 @@ def test_the_command_takes_the_method_and_says_so_in_the_data(tmp_path, capsys):
         assert (tmp_path / "figure_02.csv").read_text(encoding="utf-8") == written
 
 
+@pytest.mark.slow
+def test_all_figures_are_there_in_well_under_a_minute(tmp_path, capsys):
+    """40 s on two cores are allowed, and all is done on one: as much processor time is the same on a quiet machine."""
+    begin = time.process_time()
+    assert main(["figures", "--out", str(tmp_path)]) == 0
+    assert time.process_time() - begin < 40.0
+    names = {f"figure_{number:02d}.{kind}" for number in FIGURES for kind in ("png", "csv")}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert [line.split(":")[0] for line in capsys.readouterr().out.splitlines()] == [f"figure {n}" for n in FIGURES]
+
+
 def test_only_leaves_the_others_alone(tmp_path):
     (tmp_path / "figure_03.csv").write_text("of another run", encoding="utf-8")
     assert main(["figures", "--only", "2", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "figure_03.csv").read_text(encoding="utf-8") == "of another run"
+
+
+def test_the_figure_at_work_is_said_on_a_terminal_alone(tmp_path, monkeypatch, capsys):
+    for terminal in (True, False):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda terminal=terminal: terminal, raising=False)
+        assert main(["figures", "--only", "11", "--out", str(tmp_path)]) == 0
+        assert ("figure 11 ..." in capsys.readouterr().err) == terminal
 
 
 def test_flows_out_of_reach_are_said_by_the_command(cut_short, tmp_path, monkeypatch, capsys):

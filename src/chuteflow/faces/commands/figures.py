@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -63,8 +64,11 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     for path in names.values():
         require_writable(path, options.DRAWN)
     flows = source(method or METHODS[0], workers())
+    watched = sys.stderr.isatty()
     for number, path in names.items():
         begin = time.perf_counter()
+        if watched:
+            click.echo(f"figure {number} ...", nl=False, err=True)
         data = computed(number, flows)
         write_figure(figure(number).draw(data), path)
         with written_beside(path.with_suffix(".csv")) as partial:
@@ -75,6 +79,8 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
         lost = any(note.startswith(NOT_REACHED) for note in data.table().notes)
         ends = "; the method does not reach all flows: see the notes in the data" if lost else ""
         took = f"{time.perf_counter() - begin:.1f} s"
+        if watched:
+            click.echo("\r\x1b[K", nl=False, err=True)
         click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}{ends}")
 
 
