@@ -14,9 +14,9 @@ from chuteflow import Curve, Flow, curve
 from chuteflow.faces.cli import main
 from chuteflow.paper import figure_17
 from chuteflow.paper.branches import in_order
-from chuteflow.paper.curves import Curves
+from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
-from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, figure, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.paper.sources import NOT_REACHED, OVERBURDEN, Mapped, MappedCurves, Source, Unreached, reach, source
 from chuteflow.steady.collocation import LOG_M, LOG_T
@@ -254,6 +254,13 @@ def test_flows_out_of_reach_are_said_by_the_command(cut_short, tmp_path, monkeyp
     monkeypatch.setattr(figure_17, "LINES", {"lun": figure_17.LINES["lun"]})
     assert main(["figures", "--only", "17", "--out", str(tmp_path), "--method", "mapped"]) == 0
     assert "the method does not reach all flows: see the notes in the data" in capsys.readouterr().out
+    titles = [
+        picture.get_suptitle()
+        for picture in (
+            drawn(17, trace("Title", "closure", [dissipative(0.3)], source)) for source in (Mapped(), OVERBURDEN)
+        )
+    ]
+    assert titles == ["lines end where the method does not converge: see the data", ""]
 
 
 @pytest.mark.parametrize("command", ["figures", "report"])
