@@ -31,6 +31,7 @@ def linked(text: str, role: str) -> str:
 
 def marked_up(lines: list[str]) -> list[str]:
     """A docstring as reStructuredText: indented paragraphs outside of sections are formulas, set literally."""
+    lines = [line.removeprefix("# ") for line in lines]  # a comment on notation, for readers of the source
     out: list[str] = []
     in_section = in_formula = False
     for i, line in enumerate(lines):
@@ -45,7 +46,11 @@ def marked_up(lines: list[str]) -> list[str]:
 
 
 def _process(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    lines[:] = marked_up(lines)
+    marked = marked_up(lines)
+    if what in ("attribute", "data", "property"):
+        # What stands before a colon in the first line would be taken for a type.
+        marked[:1] = marked[0].replace(": ", ":\n", 1).split("\n")
+    lines[:] = marked
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

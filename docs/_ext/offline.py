@@ -15,7 +15,7 @@ _LOADING = {"script": "src", "img": "src", "iframe": "src", "source": "src", "li
 #: A link with one of these relations is for the reader, or for a search engine, not loaded.
 _NOT_LOADED = {"author", "canonical", "copyright", "genindex", "index", "next", "prev", "search", "up"}
 _OUTSIDE = re.compile(r"(?:[a-z]+:)?//")
-_IN_STYLE = re.compile(r"""(?:@import\s+|url\(\s*)["']?([^"')\s;]+)""")
+_IN_STYLE = re.compile(r"""(?:@import\s+(?:url\(\s*)?|url\(\s*)["']?([^"')\s;]+)""")
 
 
 class _Loaded(HTMLParser):

@@ -96,6 +96,7 @@ def test_its_flows_solve_the_printed_equations(chute, number):
     up = solve_ivp(upwards, (0.0, top), start, method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
     z = np.linspace(0.0, top, 9)
     profile = flow.profile(z)
+    assert up.sol is not None
     log_nu, T, q, u, mass, moment, flux = up.sol(z)
     np.testing.assert_allclose(np.exp(log_nu), profile.volume_fraction, rtol=AGREEMENT)
     np.testing.assert_allclose(T, profile.granular_temperature, rtol=AGREEMENT)
