@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from chuteflow.analysis.domains.columns import Part, column
-from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
-from chuteflow.analysis.domains.plane import CODES, HOT_CODES, Axis, Code, Plane, code, hot_code
+from chuteflow.analysis.domains.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
 from chuteflow.faces.contract import PARAMETERS
 from chuteflow.faces.explorer.queries import CONTROLS
 from chuteflow.steady.chute import Chute
@@ -17,8 +16,6 @@ from chuteflow.steady.chute import Chute
 _FIRST, _FIRST_HOT = 9, 33
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 _OF_BASE = ("ew", "roughness")
-#: What a column tells of the flows: how many share a flux, the number of families, and bits of the kinds that occur.
-_TOLD = ("most", "families", "interior", "density")
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,8 @@ class MapColumn:
     """What chutes are like along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
 
     ``parts`` are by name "most" (flows that share a flux), "families", "interior" and "density" (bits, see
-    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature). Their
-    stops are values of ``inner``, which may be off by ``tolerance``.
+    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature, -1
+    where the theory does not say). Their stops are values of ``inner``, which may be off by ``tolerance``.
     """
 
     outer: str
@@ -46,10 +43,12 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
     plane = _plane(chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
-    told = column(place, partial(_told, plane), _evenly(_FIRST), tolerance).parts
+    found = column(place, partial(summary, plane), _evenly(_FIRST), tolerance)
     # Narrower bands are where the search happened to meet them.
-    parts = {name: part.without_bands(tolerance) for name, part in zip(_TOLD, told, strict=True)}
-    parts["hot"] = _hot(plane, place)
+    parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
+    if plane.chute.surface == "free":
+        hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
+        parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(
         outer,
         inner,
@@ -63,20 +62,6 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
 def _plane(chute: Chute, x: str, y: str) -> Plane:
     across, up = (Axis(PARAMETERS[name], CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
     return Plane(across, up, chute, ())
-
-
-def _told(plane: Plane, outer: float, inner: float) -> Code:
-    """The class of a point of the map by _TOLD."""
-    found = dict(zip(CODES, code(plane, outer, inner), strict=True))
-    kinds = (sum(bit for name, bit in bits.items() if found[name]) for bits in (INTERIORS, DENSITIES))
-    return (found["most"], found["families"], *kinds)
-
-
-def _hot(plane: Plane, place: float) -> Part:
-    """Where hot flows exist; the theory knows the half-line alone."""
-    if plane.chute.surface != "free":
-        return Part((), (0,))
-    return column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE).parts[HOT_CODES.index("hot")]
 
 
 def _evenly(count: int) -> list[float]:
