@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning, boundary
     from chuteflow.analysis.curve import curve
     from chuteflow.analysis.enumeration import flows
     from chuteflow.analysis.hot import HotModel, hot
@@ -20,6 +21,8 @@ __version__ = "0.1.0"
 
 # Imported when first asked for, so that the command line starts quickly.
 _HOMES = {
+    "Boundary": "analysis.boundaries.boundary",
+    "BoundarySet": "analysis.boundaries.boundary",
     "Branch": "analysis.results",
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
@@ -34,6 +37,8 @@ _HOMES = {
     "Searched": "analysis.results",
     "SolveError": "errors",
     "SpecialPoint": "analysis.results",
+    "Turning": "analysis.boundaries.boundary",
+    "boundary": "analysis.boundaries.boundary",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
     "flows": "analysis.enumeration",
@@ -44,6 +49,8 @@ _HOMES = {
 
 __all__ = [
     "QUANTITIES",
+    "Boundary",
+    "BoundarySet",
     "Branch",
     "Chute",
     "ChuteflowError",
@@ -58,7 +65,9 @@ __all__ = [
     "Searched",
     "SolveError",
     "SpecialPoint",
+    "Turning",
     "__version__",
+    "boundary",
     "curve",
     "flows",
     "hot",
