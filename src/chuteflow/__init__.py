@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning, boundary
     from chuteflow.analysis.curve import curve
+    from chuteflow.analysis.domains.maps import Domain, domain
     from chuteflow.analysis.enumeration import flows
     from chuteflow.analysis.hot import HotModel, hot
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
     from chuteflow.faces.files import load, save
+    from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
@@ -27,6 +29,7 @@ _HOMES = {
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "analysis.results",
+    "Domain": "analysis.domains.maps",
     "Flow": "steady.flow",
     "FlowSet": "analysis.results",
     "InputError": "errors",
@@ -39,12 +42,15 @@ _HOMES = {
     "SpecialPoint": "analysis.results",
     "Turning": "analysis.boundaries.boundary",
     "boundary": "analysis.boundaries.boundary",
+    "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
+    "domain": "analysis.domains.maps",
     "flows": "analysis.enumeration",
     "hot": "analysis.hot",
     "load": "faces.files",
     "save": "faces.files",
+    "stability_of": "stability.verdict",
 }
 
 __all__ = [
@@ -55,6 +61,7 @@ __all__ = [
     "Chute",
     "ChuteflowError",
     "Curve",
+    "Domain",
     "Flow",
     "FlowSet",
     "HotModel",
@@ -65,14 +72,17 @@ __all__ = [
     "Searched",
     "SolveError",
     "SpecialPoint",
+    "Stability",
     "Turning",
     "__version__",
     "boundary",
     "curve",
+    "domain",
     "flows",
     "hot",
     "load",
     "save",
+    "stability_of",
 ]
 
 
