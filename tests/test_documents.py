@@ -46,6 +46,13 @@ def test_every_page_of_the_start_is_run():
     assert None not in shown
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_no_example_is_passed_over(page):
+    languages = re.findall(r"^```([\w-]+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    # A console holds what installs, serves or does not end; the others are shown, not run.
+    assert set(languages) <= {"python", "sh", "output", "console", "text", "toml"}
+
+
 def documented_names():
     text = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
     return set(re.findall(r"`([\w-]+)`", text))
