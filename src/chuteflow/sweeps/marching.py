@@ -29,6 +29,8 @@ LANES = 16384
 _DENSE = 60.0
 #: Densities X below which a lane may end as an empty one: the first of them at which that can be told.
 _THIN = (1e-2, 1e-3, 1e-6)
+#: By how much p is beyond what the empty state asks for, so that X and the coupling of the heat flux do not matter.
+_FIRMLY = 1.2
 _COLD = 4.0
 _MOST_STEPS = 4000
 #: Parts of a step that is looked at more closely.
@@ -52,13 +54,16 @@ class Accuracy:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, with
-    ln X below ``thin`` and a heat flux above ``ceiling``, beyond which none is met. ``turn`` is p_1."""
+    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
+    emptier, with ln X below ``thin``, p above ``settled`` and the heat flux between ``low`` and ``high``, beyond
+    which no base is met. ``turn`` is p_1, and ``rate`` the fastest of y in p."""
 
     deepest: Array
     floor: Array
     thin: Array
-    ceiling: Array
+    settled: Array
+    low: Array
+    high: Array
     turn: Array
     rate: Array
 
@@ -67,12 +72,14 @@ class Ends:
         """The ends of the lanes of ``batch`` at normal stresses ``deepest`` (n,)."""
         rate, balance = batch.pace()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
-        thin, ceiling = np.full(len(batch), -np.inf), np.full(len(batch), np.inf)
+        thin = np.full(len(batch), -np.inf)
+        settled, low, high = np.full((3, len(batch)), np.inf)
         for x in _THIN:
-            highest = _hot_end(batch, x)
-            told = np.isinf(ceiling) & np.isfinite(highest)
-            thin[told], ceiling[told] = np.log(x), highest[told]
-        return cls(deepest, floor, thin, ceiling, 1.0 / np.maximum(rate, 1e-3), rate)
+            told = _hot_end(batch, x)
+            new = np.isneginf(thin) & np.isfinite(told[0])
+            thin[new] = np.log(x)
+            settled[new], low[new], high[new] = told[:, new]
+        return cls(deepest, floor, thin, settled, low, high, 1.0 / np.maximum(rate, 1e-3), rate)
 
     def take(self, lanes: Indices) -> Ends:
         """The ends of ``lanes``."""
@@ -82,18 +89,34 @@ class Ends:
         """The same, but no deeper than ``deepest`` (n,)."""
         return replace(self, deepest=np.minimum(self.deepest, deepest))
 
+    def hot(self, p: Array, state: Array, slope: Array) -> NDArray[np.bool_]:
+        """Which lanes have come to their hot end, by their states and derivatives (ROWS, n)."""
+        emptier = (slope[LOG_X] < 0.0) & (state[LOG_X] < self.thin) & (p > self.settled)
+        return emptier & (state[FLUX] > self.low) & (state[FLUX] < self.high)
+
 
 def _hot_end(batch: Batch, x: float) -> Array:
-    """The heat flux (n,) above which a lane that is emptier than X meets no base any more, infinite where that
-    cannot be told."""
+    """p, and the least and largest heat flux (3, n), beyond which a lane that is emptier than X meets no base any more;
+    infinite where that cannot be told.
+
+    In the empty state dv/dln p = p^2 net/a - v^2/2, so that v > 1, with which the density falls, lasts where
+    p^2 > a/(2 net); and dy/dp = net - y/p - y^2/(2 a), which keeps y above or below the flux of the base for good
+    where it points away from it.
+    """
     empty, thin = (batch.at_density(np.full(len(batch), one)) for one in (1e-12, x))
-    # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux. Both are
-    # nearly straight in X so close to it, and lie between their ends, give or take as much again.
-    limit = _span(*(np.sqrt(2.0 * np.maximum(net, 0.0) * conduction) for conduction, net, _, _ in (empty, thin)))
-    meets = _span(empty[2], thin[2])
-    loses = (empty[1] > 0.0) & (thin[1] > 0.0)
-    over, under = loses & (meets[0] > limit[1]), loses & (meets[1] < limit[0])
-    return np.where(over, 0.0, np.where(under, np.maximum(meets[1], 0.0), np.inf))
+    # All are nearly straight in X so close to the empty state, and lie between the ends, give or take as much again.
+    (a_low, a_high), (net_low, net_high), (base_low, base_high) = (_span(empty[i], thin[i]) for i in range(3))
+    loses = (net_low > 0.0) & (a_low > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lasts = _FIRMLY * np.sqrt(a_high / (2.0 * net_low))
+        over = loses & (base_low > np.sqrt(2.0 * net_high * a_high))
+        rising = net_low - base_high**2 / (2.0 * a_low)
+        under = loses & ((base_high <= 0.0) | (rising > 0.0))
+        above = np.where(base_high > 0.0, _FIRMLY * base_high / rising, 0.0)
+    out = np.full((3, len(batch)), np.inf)
+    out[:, under] = np.maximum(lasts, above)[under], np.maximum(base_high, 0.0)[under], np.full(under.sum(), np.inf)
+    out[:, over] = lasts[over], np.full(over.sum(), -np.inf), base_low[over]
+    return out
 
 
 def _span(one: Array, other: Array) -> tuple[Array, Array]:
@@ -195,7 +218,7 @@ def _march(
             p, y = np.exp(state[LOG_P]), state[FLUX]
             h = h_next
             done = (p >= edges.deepest) | (y < edges.floor) | (state[LOG_X] > _DENSE)
-            done |= (state[LOG_X] < edges.thin) & (y > edges.ceiling) & (p > edges.turn)
+            done |= edges.hot(p, state, slope)
             stuck = ~(h > 1e-9) | (count > _MOST_STEPS)
             trouble[lane[stuck & ~done]] = True
             done |= stuck

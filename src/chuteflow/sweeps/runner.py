@@ -86,6 +86,9 @@ def cluster_workers(address: str) -> Workers:
     Raises:
         InputError: where dask.distributed is not installed, or nothing answers at the address.
     """
+    import logging
+    from concurrent.futures import CancelledError
+
     try:
         from distributed import Client, KilledWorker
         from distributed.client import FutureCancelledError
@@ -93,6 +96,9 @@ def cluster_workers(address: str) -> Workers:
         raise InputError(
             "--cluster needs dask.distributed: install it with the extra 'cluster', chuteflow[cluster]"
         ) from None
+
+    # What is lost on the way is told here, in a line.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
 
     def connected() -> Any:
         return Client(address, timeout=10, set_as_default=False)
@@ -120,7 +126,7 @@ def cluster_workers(address: str) -> Workers:
             finally:
                 executor.shutdown(wait=False)
 
-    return Workers(count, start, (BrokenExecutor, KilledWorker, FutureCancelledError))
+    return Workers(count, start, (BrokenExecutor, KilledWorker, FutureCancelledError, CancelledError))
 
 
 def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marker]:

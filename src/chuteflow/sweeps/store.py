@@ -287,11 +287,13 @@ def _lay_out(path: Path, study: Study) -> None:
     """Make the folders and the metadata of a store without a chunk."""
     (path / _OWN / _DONE).mkdir(parents=True)
     (path / _OWN / "study.json").write_text(study.canonical, encoding="utf-8")
+    # An empty group, so that readers that list the folder know what it is.
+    _write_json(path / _OWN / "zarr.json", {"zarr_format": 3, "node_type": "group", "attributes": {}})
     metadata: dict[str, Any] = {}
     for name, variable in variables(study).items():
         (path / name).mkdir()
         metadata[name] = _array_metadata(study, variable)
-        (path / name / "zarr.json").write_text(json.dumps(metadata[name]), encoding="utf-8")
+        _write_json(path / name / "zarr.json", metadata[name])
     group = {
         "zarr_format": 3,
         "node_type": "group",
@@ -299,7 +301,11 @@ def _lay_out(path: Path, study: Study) -> None:
         # With which readers need not list the folder.
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": metadata},
     }
-    (path / "zarr.json").write_text(json.dumps(group), encoding="utf-8")
+    _write_json(path / "zarr.json", group)
+
+
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(content), encoding="utf-8")
 
 
 def _attributes(study: Study) -> dict[str, Any]:

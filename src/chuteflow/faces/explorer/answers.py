@@ -23,7 +23,7 @@ from chuteflow.steady.flow import Flow
 
 #: Relative error allowed: far below what can be seen on a page. Exports are exact.
 _VISIBLE = 1e-6
-_CURVE_POINTS = 120
+_CURVE_POINTS = 90
 #: Heights of a profile: in the flow itself, and above it up to where the profiles of all flows end.
 _WITHIN, _ABOVE = 61, 20
 #: A flow itself is so many times as high as its centre of mass; so are all profiles, by the highest of the flows.

@@ -17,8 +17,6 @@ from chuteflow.faces.explorer.answers import Answer, answer, problem
 
 #: Answers that a lane remembers, and questions that wait in it at most.
 _REMEMBERED, _WAITING = 256, 64
-#: How much lower the priority of a process in the background is.
-_NICE = 10
 #: Seconds after which it is looked again whether anybody still waits for an answer.
 _PATIENCE = 0.2
 
@@ -43,12 +41,14 @@ class Lane:
 
     Args:
         limit: seconds that one question may take.
-        background: with a low priority, and a question that nobody waits for any more is broken off.
+        nice: by how much the priority of the process is lower than that of this one, 0 to 19.
+        breaks_off: a question in work that nobody waits for any more is broken off.
     """
 
-    def __init__(self, limit: float, *, background: bool = False) -> None:
+    def __init__(self, limit: float, *, nice: int = 0, breaks_off: bool = False) -> None:
         self._limit = limit
-        self._background = background
+        self._nice = nice
+        self._breaks_off = breaks_off
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._waiting = 0
         self._remembered: OrderedDict[tuple[str, frozenset[tuple[str, str]]], Answer] = OrderedDict()
@@ -92,8 +92,8 @@ class Lane:
         return await waited
 
     def _broken_off(self, ticket: object, work: Future[Answer]) -> Answer:
-        """Take back a question that waits; in the background also one in work."""
-        if not work.cancel() and self._background:
+        """Take back a question that waits, and where that is wanted also one in work."""
+        if not work.cancel() and self._breaks_off:
             with self._lock:
                 if self._in_work is ticket and self._process is not None:
                     self._process.kill()
@@ -127,7 +127,7 @@ class Lane:
             os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
             context = multiprocessing.get_context("spawn")
             near, far = context.Pipe()
-            process = context.Process(target=_serve, args=(far, self._background), daemon=True)
+            process = context.Process(target=_serve, args=(far, self._nice), daemon=True)
             process.start()
             far.close()
             self._pipe, self._process = near, process
@@ -143,11 +143,11 @@ class Lane:
             pipe.close()
 
 
-def _serve(pipe: Pipe, background: bool) -> None:
+def _serve(pipe: Pipe, nice: int) -> None:
     """Answer until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if background and hasattr(os, "nice"):
-        os.nice(_NICE)
+    if hasattr(os, "nice"):
+        os.nice(nice)
     while True:
         try:
             question, query = pipe.recv()

@@ -6,7 +6,7 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,10 +31,25 @@ if TYPE_CHECKING:
 #: Names of this machine that no other can reach it by.
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 PAGE = Path(__file__).parent / "page"
-#: Seconds that one answer may take. Each question has a process of its own, so that quick ones never wait for slow.
-_LIMITS = {"flows": 10.0, "curve": 20.0, "map": 30.0, "stability": 60.0, "export": 60.0}
-#: Questions that hold up no other: their processes have a low priority.
-_BACKGROUND = ("map", "stability")
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """Seconds that one answer may take, by how much its process gives way, and whether it is broken off unheard."""
+
+    limit: float
+    nice: int
+    breaks_off: bool = False
+
+
+#: Each question has a process of its own, so that quick ones never wait for slow ones; and slow ones give way.
+_TERMS = {
+    "flows": _Terms(10.0, 0),
+    "curve": _Terms(20.0, 0),
+    "export": _Terms(60.0, 4),
+    "map": _Terms(30.0, 10),
+    "stability": _Terms(60.0, 12, breaks_off=True),
+}
 _LONGEST_QUERY = 1000
 _HEADERS = {
     b"content-security-policy": b"default-src 'self'; img-src 'self' data: blob:; style-src 'self'; "
@@ -88,7 +103,7 @@ def host_of(header: str) -> str:
 
 def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
     """The application, for requests to one of ``hosts``, or to any for None."""
-    lanes = {question: Lane(_LIMITS[question], background=question in _BACKGROUND) for question in QUESTIONS}
+    lanes = {question: Lane(**asdict(_TERMS[question])) for question in QUESTIONS}
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -140,7 +155,8 @@ def bound(host: str, port: int | None) -> socket.socket:
         raise InputError(f"--host {host!r}: not an address of this machine, try 127.0.0.1") from None
     problem = ""
     for number in wanted:
-        listener = socket.socket(family, socket.SOCK_STREAM)
+        # With the protocol named, asyncio sends small answers at once instead of waiting for more to send.
+        listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((address[0], number))

@@ -1,5 +1,5 @@
 // Charts as SVG: axes, areas, lines that may fold back, marks. Everything is redrawn at each change; it is small.
-import { escaped } from "./page.js";
+import { escaped, sizeOf } from "./page.js";
 
 /** A number with so many digits, without needless zeros. */
 export function number(value, digits = 4) {
@@ -54,13 +54,13 @@ const shapes = {
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
 };
 
-function axes(x, y, sx, sy, { l, r, t, b }, height) {
+function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
   const out = [];
   for (const v of ticks(x, Math.max(2, (r - l) / 62))) {
     const p = sx(v).toFixed(1);
     out.push(`<path class="grid" d="M${p} ${t}V${b}"/><text x="${p}" y="${b + 14}" text-anchor="middle">${number(v, 3)}</text>`);
   }
-  for (const v of ticks(y, Math.max(2, (b - t) / 44))) {
+  for (const v of levels) {
     const p = sy(v).toFixed(1);
     out.push(`<path class="grid" d="M${l} ${p}H${r}"/>`);
     if (!y.bare) out.push(`<text x="${l - 5}" y="${Number(p) + 4}" text-anchor="end">${number(v, 3)}</text>`);
@@ -75,24 +75,26 @@ function axes(x, y, sx, sy, { l, r, t, b }, height) {
  * Draw into `svg`; returns the scales `sx`, `sy` and the frame `box`.
  *
  * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}. `lines`: {points,
- * colour, dash, width}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: {x, y}, either.
+ * colour, dash, width}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
-export function draw(svg, { x, y, areas = [], lines = [], marks = [], hair = {}, left = 52 }) {
-  const width = svg.clientWidth || 300, height = svg.clientHeight || 300;
-  const box = { l: left, r: width - 10, t: 10, b: height - 36 };
+export function draw(svg, { x, y, areas = [], lines = [], marks = [], hair }) {
+  const { width, height } = sizeOf(svg);
+  const levels = ticks(y, Math.max(2, (height - 46) / 44));
+  // Room for the numbers, of some 6.6 pixels a digit, and for what they are of.
+  const digits = y.bare ? 0 : Math.max(...levels.map((v) => number(v, 3).length));
+  const box = { l: Math.round(digits * 6.6) + (y.label ? 28 : 12), r: width - 10, t: 10, b: height - 36 };
   const sx = scale(x, box.l, box.r), sy = scale(y, box.b, box.t);
   const inside = [];
   for (const { rings, colour } of areas) inside.push(`<path d="${rings.map((points) => `${path(points, sx, sy)}z`).join("")}" fill="${colour}" stroke="${colour}" stroke-width=".7"/>`);
   for (const { points, colour, dash, width: thick = 2 } of lines) {
     inside.push(`<path class="line" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
   }
-  if (hair.x !== undefined) inside.push(`<path class="hair" d="M${sx(hair.x).toFixed(1)} ${box.t}V${box.b}"/>`);
-  if (hair.y !== undefined) inside.push(`<path class="hair" d="M${box.l} ${sy(hair.y).toFixed(1)}H${box.r}"/>`);
+  if (hair !== undefined) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
   for (const mark of marks) {
     const shape = shapes[mark.shape](Number(sx(mark.x).toFixed(1)), Number(sy(mark.y).toFixed(1)), mark);
     inside.push(`${shape}<title>${escaped(mark.title)}</title>${shape.startsWith("<path") ? "</path>" : "</circle>"}`);
   }
   svg.innerHTML = `<clipPath id="${svg.id}-clip"><rect x="${box.l - 8}" y="${box.t - 8}" width="${Math.max(0, box.r - box.l + 16)}" height="${box.b - box.t + 8}"/></clipPath>
-    ${axes(x, y, sx, sy, box, height)}<g clip-path="url(#${svg.id}-clip)">${inside.join("")}</g>`;
+    ${axes(x, y, sx, sy, box, height, levels)}<g clip-path="url(#${svg.id}-clip)">${inside.join("")}</g>`;
   return { sx, sy, box };
 }

@@ -81,7 +81,7 @@ export function redraw() {
   }
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
   shown = draw(svg, {
-    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(names[name], name)), lines, marks, hair: { x: Number(state.Q) * sq },
+    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(names[name], name)), lines, marks, hair: Number(state.Q) * sq,
   });
   svg.setAttribute("aria-valuenow", String(Number(state.Q) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));

@@ -1,5 +1,5 @@
 // A drawing of the chosen flow: grains placed by the volume fraction, carried by the velocity, shaken by the temperature.
-import { byId, colour, download } from "./page.js";
+import { byId, colour, download, sizeOf } from "./page.js";
 
 const canvas = byId("chute"), key = byId("chute-key"), pause = byId("pause");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -15,9 +15,12 @@ function at(field, z, height) {
   return field[low] * (1 - w) + field[high] * w;
 }
 
+/** The i-th grain: its share of the mass below, and its place along the chute, both evenly spread. */
+const placed = (i) => ({ share: (0.5 + i * 0.7548776662466927) % 1, x: (0.5 + i * 0.5698402909980532) % 1, dx: 0, dz: 0 });
+
 /** Show a flow, or none, on its slope. */
 export function show(flow, slope, ink) {
-  const box = canvas.getBoundingClientRect(), ratio = devicePixelRatio || 1;
+  const box = sizeOf(canvas), ratio = devicePixelRatio || 1;
   const [width, height] = [box.width, box.height].map((side) => Math.max(1, Math.round(side * ratio)));
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   if (!flow) {
@@ -32,20 +35,20 @@ export function show(flow, slope, ink) {
   const radius = Math.min(largest, Math.max(smallest, pixel / 2)), length = (box.width / Math.cos(angle) + 2 * radius) / pixel + top * slope;
   const mass = [0], inside = z.filter((height) => height <= top * 1.000001);
   for (let i = 1; i < inside.length; i++) mass.push(mass[i - 1] + ((nu[i] + nu[i - 1]) / 2) * (z[i] - z[i - 1]));
-  // A disc of diameter 1 covers pi/4: so many are needed for the volume fraction to be the share that is covered.
-  const exact = (4 / Math.PI) * mass.at(-1) * length, count = Math.round(Math.min(most, Math.max(fewest, exact)));
+  // So many discs that the share of the picture which they cover is the volume fraction, whatever their size.
+  const exact = (mass.at(-1) * length * pixel ** 2) / (Math.PI * radius ** 2), count = Math.round(Math.min(most, Math.max(fewest, exact)));
   view = { slope, angle, top, pixel, radius, length, ratio, ink, width: box.width, height: box.height, start: box.height - 10 - fall };
   view.pace = (0.25 * length) / Math.max(...u.slice(0, inside.length), 1e-9);
   while (grains.length > count) grains.pop();
-  while (grains.length < count) grains.push({ share: Math.random(), x: Math.random(), dx: 0, dz: 0 });
+  while (grains.length < count) grains.push(placed(grains.length));
   for (const grain of grains) {
     grain.z = at(inside, mass, grain.share * mass.at(-1));
     grain.u = at(u, z, grain.z);
     grain.root = Math.sqrt(Math.max(0, at(T, z, grain.z)));
   }
   const size = pixel / 2 < smallest ? "grains drawn larger than they are" : pixel / 2 > largest ? "grains drawn smaller than they are" : "grains to scale";
-  const number = count === Math.round(exact) ? "" : count < exact ? ", fewer than there are" : ", more than there are";
-  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${number}; they move by the velocity and jitter by the temperature.`;
+  const number = count === Math.round(exact) ? "" : count < exact ? ", fewer than should be" : ", more than should be";
+  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${number}. They cover as much as the volume fraction says, move by the velocity and jitter by the temperature.`;
   paint(0);
 }
 
@@ -64,8 +67,8 @@ function move(dt) {
 
 /** Where grains are drawn, in pixels along the chute and above it. */
 function* places() {
-  const { length, pixel, radius } = view;
-  for (const grain of grains) yield [(grain.x * length + grain.dx) * pixel - radius, Math.abs(grain.z + grain.dz) * pixel + radius];
+  const { length, pixel, radius, top, slope } = view, lean = top * slope;
+  for (const grain of grains) yield [(grain.x * length - lean + grain.dx) * pixel - radius, Math.abs(grain.z + grain.dz) * pixel + radius];
 }
 
 /** Grains of the base, half sunk. */

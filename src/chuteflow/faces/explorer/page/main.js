@@ -38,11 +38,15 @@ const asks = {
   curve: new Latest("curve", (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
 };
 
+const failures = {};
+
 /** Use an answer, or say what went wrong and that the panels are not of what the controls say. */
 function take(answer, name, since, use) {
-  byId("failure").hidden = !answer.error;
-  byId("failure").textContent = answer.error ? `${answer.error}. What is shown below is of before.` : "";
-  document.querySelector("main").classList.toggle("of-before", Boolean(answer.error));
+  failures[name] = answer.error ?? "";
+  const failure = Object.values(failures).find(Boolean) ?? "";
+  byId("failure").hidden = !failure;
+  byId("failure").textContent = failure && `${failure}.${flows ? " What is shown below is of before." : ""}`;
+  document.querySelector("main").classList.toggle("of-before", Boolean(failure));
   if (answer.error) return;
   use();
   measured(name, since);
@@ -57,12 +61,17 @@ function measured(name, since) {
   requestAnimationFrame(() => setTimeout(() => performance.measure(`${name}-redraw`, { start: since, end: performance.now() })));
 }
 
-const askFlows = () => asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
+function askFlows() {
+  stability.stop();
+  asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
+}
 const askCurve = () => asks.curve.ask({ ...chute(), ...grains() }, mark);
 
 onChange((has) => {
-  if (has("theme")) document.documentElement.dataset.theme = state.theme;
-  forgetColours();
+  if (has("theme")) {
+    document.documentElement.dataset.theme = state.theme;
+    forgetColours();
+  }
   showControls();
   const words = has("si", "d", "rho");
   if (ofChute(has) || has("Q") || words) askFlows();

@@ -46,7 +46,8 @@ export function changed(has) {
   // A cross-hair that moves asks nothing: one map serves all of its positions.
   const moved = has("x", "y", "surface", "closure") || names.some((name) => has(name) && name !== state.x && name !== state.y);
   if (moved || has("shade")) asking.begin();
-  redraw();
+  if (has("shade")) drawn = null;
+  if (!shown || moved || has("shade", "theme")) redraw(); else placeHair();
 }
 
 const asking = new AtRest(150, async (signal) => {
@@ -89,7 +90,23 @@ function shownOf(column) {
   return { at: column.at, stops, classes };
 }
 
-const alike = (a, b) => a.classes.length === b.classes.length && a.classes.every(({ value, hot }, k) => value === b.classes[k].value && hot === b.classes[k].hot);
+const same = (a, b) => a.value === b.value && a.hot === b.hot;
+const alike = (a, b) => a.classes.length === b.classes.length && a.classes.every((one, k) => same(one, b.classes[k]));
+
+/** Where the stops of two columns are half-way between them: those that correspond, from either end, meet there. */
+function middles(a, b) {
+  const [n, m] = [a.stops.length, b.stops.length], ends = [[...a.stops], [...b.stops]];
+  const meet = (i, j) => { ends[0][i] = ends[1][j] = (a.stops[i] + b.stops[j]) / 2; };
+  let low = 0, high = 0;
+  while (low < Math.min(n, m) && same(a.classes[low], b.classes[low]) && same(a.classes[low + 1], b.classes[low + 1])) { meet(low, low); low++; }
+  while (high < Math.min(n, m) - low && same(a.classes[n - high], b.classes[m - high]) && same(a.classes[n - high - 1], b.classes[m - high - 1])) { high++; meet(n - high, m - high); }
+  // The others stay where they are, as far as those that meet let them.
+  for (const stops of ends) for (let k = low; k < stops.length - high; k++) {
+    stops[k] = Math.max(stops[k], low ? stops[low - 1] : -Infinity);
+    if (high) stops[k] = Math.min(stops[k], stops[stops.length - high]);
+  }
+  return ends;
+}
 
 /** Middles of the stretches between columns whose classes do not follow from one another. */
 function narrower(found) {
@@ -105,24 +122,33 @@ function narrower(found) {
 function pieces(found, x) {
   const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
   const at = (o, i) => (outer === x ? [o, i] : [i, o]);
-  const slab = (from, to, left, right) => {
-    const [start, end] = [left, right].map(({ stops }) => [low, ...stops, high]);
-    left.classes.forEach(({ value, hot }, k) => {
+  const slab = (from, to, left, right, classes) => {
+    const [start, end] = [left, right].map((stops) => [low, ...stops, high]);
+    classes.forEach(({ value, hot }, k) => {
       if (!areas.has(value)) areas.set(value, []);
       areas.get(value).push([at(from, start[k]), at(to, end[k]), at(to, end[k + 1]), at(from, start[k + 1])]);
-      if (k && hot !== left.classes[k - 1].hot) lines.push([at(from, start[k]), at(to, end[k])]);
+      if (k && hot !== classes[k - 1].hot) lines.push([at(from, start[k]), at(to, end[k])]);
     });
   };
   const seen = found.map(shownOf);
   for (let i = 1; i < seen.length; i++) {
-    const [a, b] = [seen[i - 1], seen[i]], middle = (a.at + b.at) / 2;
-    if (alike(a, b)) { slab(a.at, b.at, a, b); continue; }
-    slab(a.at, middle, a, a);
-    slab(middle, b.at, b, b);
+    const [a, b] = [seen[i - 1], seen[i]], middle = (a.at + b.at) / 2, [left, right] = middles(a, b);
+    slab(a.at, middle, a.stops, left, a.classes);
+    slab(middle, b.at, right, b.stops, b.classes);
   }
   return { areas, lines };
 }
 
+/** Only the cross-hair moves while it is dragged; the map stays. */
+function placeHair() {
+  const { sx, sy, box } = shown, x = sx(Number(state[state.x])).toFixed(1), y = sy(Number(state[state.y])).toFixed(1);
+  byId("map-hair").setAttribute("d", `M${x} ${box.t}V${box.b}M${box.l} ${y}H${box.r}`);
+  for (const [name, value] of [["cx", x], ["cy", y]]) byId("map-here").setAttribute(name, value);
+  const [across, up] = [state.x, state.y].map((name) => `${about.controls[name].label} ${state[name]}`);
+  svg.setAttribute("aria-label", `Map of chutes, cross-hair at ${across}, ${up}: move it with the arrow keys`);
+}
+
+/** Draw the map as far as it is known. */
 export function redraw() {
   const current = columns.length && wanted.x === state.x && wanted.y === state.y;
   if (current) drawn ??= pieces(columns, state.x);
@@ -131,17 +157,17 @@ export function redraw() {
     return { low, high, label: `${label.toLowerCase()} ${symbol.replace("_w", "w")}` };
   };
   const { says, name } = shadings[shading()], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
-  const here = { x: Number(state[state.x]), y: Number(state[state.y]) }, shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
+  const shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
   shown = draw(svg, {
-    x: axis(state.x), y: axis(state.y), hair: here,
+    x: axis(state.x), y: axis(state.y),
     areas: values.map((value) => ({ rings: drawn.areas.get(value), colour: shade(value) })),
     lines: current ? drawn.lines.map((points) => ({ points, colour: colour("--curve") })) : [],
-    marks: [{ ...here, shape: "circle", title: "this chute" }],
   });
   svg.classList.toggle("waiting", !current || !whole);
-  svg.setAttribute("aria-label", `Map of chutes, cross-hair at ${axis(state.x).label} = ${state[state.x]}, ${axis(state.y).label} = ${state[state.y]}: move it with the arrow keys`);
+  svg.insertAdjacentHTML("beforeend", `<path id="map-hair" class="hair"/><circle id="map-here" class="special" r="4.5"><title>this chute</title></circle>`);
   const legend = values.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
   key.innerHTML = current ? `${says}: ${legend.join(" ")}. Line: on one side of it there are flows at every high temperature. Drag the cross-hair to another chute.` : "";
+  placeHair();
   key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
 }
 

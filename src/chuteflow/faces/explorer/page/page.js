@@ -4,6 +4,20 @@ export const byId = (id) => document.getElementById(id);
 
 export const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
+const sizes = new WeakMap();
+const watcher = new ResizeObserver((entries) => {
+  for (const { target, contentRect } of entries) sizes.set(target, contentRect);
+});
+
+/** Width and height of an element. Asking the browser after each change would make it lay out the page anew. */
+export function sizeOf(element) {
+  if (!sizes.has(element)) {
+    sizes.set(element, element.getBoundingClientRect());
+    watcher.observe(element);
+  }
+  return sizes.get(element);
+}
+
 let seen = {};
 
 /** The value of a colour of the theme, such as "--ink". */

@@ -1,25 +1,27 @@
 // Profiles of all flows over height, and the budget of fluctuation energy of the chosen one.
 import { draw } from "./chart.js";
-import { byId, flowColour } from "./page.js";
-import { factor, labelled } from "./units.js";
+import { byId, flowColour, sizeOf } from "./page.js";
+import { factor, labelled, unit } from "./units.js";
 
-const panels = [["nu", "volume fraction ν"], ["T", "granular temperature T"], ["u", "velocity u"]];
+const panels = [["nu", "volume fraction", "ν"], ["T", "granular temperature", "T"], ["u", "velocity", "u"]];
+// Narrower panels than this have no room for words, nor for numbers beside all but the first.
+const narrow = 210;
 const dashes = ["", "7 4", "2 3"];
 
 export function drawProfiles(list, top, chosen) {
   const sz = factor("z");
-  for (const [symbol, label] of panels) {
-    const svg = byId(`profile-${symbol}`), s = factor(symbol), first = symbol === "nu";
-    const largest = Math.max(1e-12, ...list.flatMap((flow) => flow.profile[symbol])) * s;
+  for (const [symbol, words, letter] of panels) {
+    const svg = byId(`profile-${symbol}`), s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
+    const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
+    const largest = list.length ? Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s : 1;
     draw(svg, {
-      left: first || svg.clientWidth > 260 ? 52 : 16,
-      x: { low: 0, high: largest * 1.05, label: labelled(label, symbol) },
-      y: { low: 0, high: top * sz, label: first ? labelled("height z", "z") : "", bare: !first && svg.clientWidth <= 260 },
+      x: { low: 0, high: largest * 1.05, label },
+      y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
       lines: list.map((flow, i) => ({
         points: flow.profile.z.map((z, n) => [flow.profile[symbol][n] * s, z * sz]), colour: flowColour(i), width: i === chosen ? 3.4 : 2,
       })),
     });
-    svg.setAttribute("aria-label", `${label} against height for ${list.length} flows`);
+    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows`);
   }
 }
 
@@ -40,7 +42,7 @@ function drawRates(flow, i) {
     x: { low: -largest, high: largest, label: labelled("gain of fluctuation energy per volume", "gamma") },
     y: { low: 0, high: z[within - 1] * sz, label: labelled("height z", "z") },
     lines: terms.map((term, k) => ({ points: term.slice(0, within).map((v, n) => [v * s, z[n] * sz]), colour: flowColour(i), dash: dashes[k] })),
-    hair: { x: 0 },
+    hair: 0,
   });
   const inner = dissipation.slice(0, within), wins = production.slice(0, within).map((work, n) => work - inner[n]);
   const heated = wins.every((v) => v <= 0) ? "conduction brings heat at every height" : wins.every((v) => v >= 0) ? "conduction takes heat at every height" : "conduction takes heat from where work exceeds dissipation to where it does not";
@@ -57,7 +59,7 @@ function drawShares(flow, i) {
     ["gained", [["slip on the base", b.slip_work, 1], ["shear inside", b.shear_work, 0.6], ["free grains above", above, 0.3]]],
     ["lost", [["hitting the base", b.base_loss, 1], ["among the grains", b.dissipation, 0.6]]],
   ];
-  const width = svg.clientWidth - 60, share = (v) => `${Math.round((100 * v) / total)} %`;
+  const width = sizeOf(svg).width - 60, share = (v) => `${Math.round((100 * v) / total)} %`;
   svg.innerHTML = rows.map(([name, parts], r) => {
     let x = 58;
     const bars = parts.map(([, v, opacity]) => {

@@ -16,11 +16,14 @@ const asking = new AtRest(400, async (signal) => {
   }
 });
 
-/** Other flows than before are shown: `number` of them. */
+/** Other flows are wanted: what is asked about those before is taken back. */
+export const stop = () => asking.stop();
+
+/** Other flows are there: `number` of them. */
 export function restart(number) {
   verdicts = [];
   count = number;
-  if (count) asking.begin(); else asking.stop();
+  if (count) asking.begin();
 }
 
 /** Put what is known beside the flows. */
