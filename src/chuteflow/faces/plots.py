@@ -113,7 +113,7 @@ def _none(chute: Chute, reason: str | None) -> Figure:
 
 
 def parameters(chute: Chute) -> str:
-    """The chute in small print above a picture."""
+    """All parameters of ``chute``, for a caption."""
     surface = {"free": "free surface", "interface": "interface"}[chute.surface]
     return (
         rf"$\tan\theta = {chute.slope:g}$, $e = {chute.restitution:g}$, $e_w = {chute.wall_restitution:g}$, "

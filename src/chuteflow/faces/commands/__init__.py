@@ -12,5 +12,6 @@ COMMANDS = {
     "claims": "Compute every statement of the paper that can be tested, with a verdict on each.",
     "report": "One page with every figure and claim of the paper, recomputed, and verdicts.",
     "explore": "A page in the browser: drag every parameter, and see every flow.",
+    "stability": "Which flows are stable, and the disturbance that grows fastest.",
     "relax": "Follow a disturbed flow in time, to the steady flow that it comes to.",
 }

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
-from chuteflow.analysis.domains.columns import column
-from chuteflow.analysis.domains.plane import CODES, Axis, Plane
+from chuteflow.analysis.domains.columns import halved
+from chuteflow.analysis.domains.plane import SUMMARY, Axis, Plane, summary
 from chuteflow.faces.contract import PARAMETERS
 from chuteflow.faces.explorer.queries import CONTROLS
 from chuteflow.steady.chute import Chute
@@ -32,7 +32,7 @@ class MapColumn:
     stops: tuple[float, ...]
     codes: tuple[tuple[int, ...], ...]
     tolerance: float
-    names: tuple[str, ...] = CODES
+    names: tuple[str, ...] = SUMMARY
 
 
 def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
@@ -44,13 +44,14 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
     plane = _plane(chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
-    found = column(plane, place, [(i + 0.5) / _FIRST for i in range(_FIRST)], tolerance)
+    first = [(i + 0.5) / _FIRST for i in range(_FIRST)]
+    stops, codes = halved(place, partial(summary, plane), first, tolerance)
     return MapColumn(
         outer,
         inner,
         float(plane.outer.at(place)),
-        tuple(float(plane.inner.at(stop)) for stop in found.stops),
-        found.codes,
+        tuple(float(plane.inner.at(stop)) for stop in stops),
+        tuple(codes),
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
 
