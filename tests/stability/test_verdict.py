@@ -20,7 +20,7 @@ def mode_of(flow, **given):
 @pytest.mark.parametrize(
     ("name", "direction", "growth", "wavenumber"),
     [
-        ("A", "across", 3.969606e-3, 0.010051),
+        pytest.param("A", "across", 3.969606e-3, 0.010051, marks=pytest.mark.slow),
         pytest.param("B", "across", 1.02525e-3, 0.012621, marks=pytest.mark.slow),
         ("C", "along", 7.27575e-3, 0.01109),
     ],
@@ -49,7 +49,7 @@ def test_a_stable_flow():
     assert -found.smallest_rate * 20.0 < mode.growth < 0.0
     low, high = found.searched
     for angle in (0.0, 0.7, np.pi / 2):
-        for k in np.geomspace(low, high, 4):
+        for k in np.geomspace(low, high, 3):
             kx, ky = (0.0, k) if angle > 1.5 else (k * np.cos(angle), k * np.sin(angle))
             assert all(other.growth < 0.0 for other in leading(Disturbances(flow), kx, ky))
 
