@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from chuteflow.analysis.curve import curve
+    from chuteflow.analysis.domains.maps import Domain, domain
     from chuteflow.analysis.enumeration import flows
     from chuteflow.analysis.hot import HotModel, hot
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
@@ -25,6 +26,7 @@ _HOMES = {
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "analysis.results",
+    "Domain": "analysis.domains.maps",
     "Flow": "steady.flow",
     "FlowSet": "analysis.results",
     "InputError": "errors",
@@ -38,6 +40,7 @@ _HOMES = {
     "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
+    "domain": "analysis.domains.maps",
     "flows": "analysis.enumeration",
     "hot": "analysis.hot",
     "load": "faces.files",
@@ -51,6 +54,7 @@ __all__ = [
     "Chute",
     "ChuteflowError",
     "Curve",
+    "Domain",
     "Flow",
     "FlowSet",
     "HotModel",
@@ -64,6 +68,7 @@ __all__ = [
     "Stability",
     "__version__",
     "curve",
+    "domain",
     "flows",
     "hot",
     "load",

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow.analysis.ranges import DEEPEST, WIDEST
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.sweeps.bases import FLOOR, LADDER, SAFETY, Flows, flows_on, meets_base
@@ -33,14 +34,20 @@ _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
 _MOST = 12
 #: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
-#: Rounds of new columns, and the closest two columns.
-_ROUNDS, _CLOSEST = 60, 1e-12
+#: Rounds of new columns. The few lanes that want more are searched one by one, which is cheaper by then.
+_ROUNDS = 14
+#: The range is widened at most so often, where ln of the quantity rises at least with this power of T.
+_WIDENINGS, _LEADS = 4, 0.25
+#: Flows this near to the largest hold-up, in the logarithm, may lead beyond it, with at most this power of M.
+_AT_EDGE, _STEEPEST = 0.3, 4.0
 #: Columns reach to hold-ups a little beyond those asked for, so that no flow lies beside the last one.
 _BEYOND = 1.1
 #: Where two flows meet, the value there lies within this many of their distances, and a little.
 _ASIDE, _LITTLE = 1.0, 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
+#: The share of a change that is left in the finer of two integrations, at most.
+_CHANCE = 0.1
 #: A flow meets the value asked for to this.
 _MEETS = 1e-11
 
@@ -137,15 +144,15 @@ def at_quantity(
     many = max(int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE)), 2) + 1
     lanes = np.arange(len(batch))
     columns = problem.columns(np.repeat(lanes, many), np.tile(np.linspace(low, high, many), len(batch)))
+    for edge in (1, -1):
+        columns = _widened(problem, columns, edge)
     unsettled = np.zeros(len(batch), dtype=bool)
     brackets: list[Brackets] = []
     for _ in range(_ROUNDS):
         unsettled[columns.lane[columns.count < 0]] = True
+        unsettled[columns.lane[_deeper(problem, columns)]] = True
         columns = columns.of(~unsettled)
         found, split = _links(problem, columns)
-        gap = columns.log_t[split + 1] - columns.log_t[split]
-        unsettled[columns.lane[split[gap < _CLOSEST]]] = True
-        split = split[gap >= _CLOSEST]
         # A lane is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
         ready[columns.lane[split]] = False
@@ -164,6 +171,42 @@ def at_quantity(
     unsettled |= failed
     inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.lane]) & ~unsettled[flows.lane]
     return Flows.joined([flows.take(inside)]), unsettled
+
+
+def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
+    """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each lane, where flows lead out of the range
+    towards the value asked for, as :func:`chuteflow.flows` has it."""
+    for _ in range(_WIDENINGS):
+        ends = np.flatnonzero(np.diff(columns.lane, append=-1) if edge > 0 else np.diff(columns.lane, prepend=-1))
+        before = ends - edge
+        a, b = columns.flows[before], columns.flows[ends]
+        run = (columns.log_t[ends] - columns.log_t[before])[:, None]
+        left = problem.target[columns.lane[ends], None] - b[..., problem.which]
+        alike = (np.abs(a - b) <= _APART + _BY_TEMPERATURE * np.abs(run)[..., None]).all(axis=-1)
+        slope = (b - a)[..., problem.which] / run
+        with np.errstate(invalid="ignore"):
+            leads = alike & (slope * np.sign(left) * edge > _LEADS)
+            reach = np.where(leads, 1.2 * np.abs(left / slope) + 1.0, 0.0).max(axis=1)
+        limit = np.log(WIDEST[edge > 0])
+        reach = np.minimum(reach, np.maximum(edge * (limit - columns.log_t[ends]), 0.0))
+        many = np.ceil(reach / np.log(10.0) * _PER_DECADE).astype(np.intp)
+        if not many.any():
+            break
+        which = np.repeat(np.arange(ends.size), many)
+        share = (np.arange(which.size) - (np.cumsum(many) - many)[which] + 1) / many[which]
+        new = columns.log_t[ends[which]] + edge * reach[which] * share
+        columns = columns.joined(problem.columns(columns.lane[ends[which]], new))
+    return columns
+
+
+def _deeper(problem: Problem, columns: Columns) -> NDArray[np.bool_]:
+    """The columns with flows near the largest hold-up that may lead beyond it, to the value asked for."""
+    log_m, target = columns.flows[..., LOG_M], problem.target[columns.lane, None]
+    left = target - columns.flows[..., problem.which]
+    with np.errstate(invalid="ignore"):
+        at_edge = log_m > problem.deepest[columns.lane, None] - _AT_EDGE
+        within_reach = (left > 0.0) & (left < _STEEPEST * (np.log(DEEPEST) - log_m))
+    return (at_edge & within_reach).any(axis=1) & (problem.which != LOG_M)
 
 
 def _chosen(brackets: Brackets, lanes: NDArray[np.bool_]) -> Brackets:
@@ -289,8 +332,10 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
         # What changes at a given surface temperature is carried over to the given quantity.
         change = there.macroscopic[:LOG_T] - here[:LOG_T]
         off = there.macroscopic[problem.which] - problem.target[brackets.lane[pending]]
-        carried = np.abs(change - near.gradient(pending) * (change[problem.which] / slope[pending]))
+        along = near.gradient(pending) * (change[problem.which] / slope[pending])
         rest = np.abs(near.gradient(pending) * (off - change[problem.which]) / slope[pending])
+        # Both parts may cancel by chance: no more of them than of the errors that they stand for.
+        carried = np.maximum(np.abs(change - along), _CHANCE * (np.abs(change) + np.abs(along)))
         error = np.maximum(SAFETY * (carried + rest).max(axis=0), FLOOR)
         moved = there.macroscopic.copy()
         moved[:LOG_T] -= near.gradient(pending) * (off / slope[pending])
@@ -309,10 +354,9 @@ class Near:
     def __init__(self, problem: Problem, brackets: Brackets) -> None:
         self._problem, self._brackets = problem, brackets
         self._batch = problem.batch.take(brackets.lane)
-        ends = problem.ends.take(brackets.lane)
         # A little below the flow is deep enough.
-        deepest = np.minimum(ends.deepest, problem.batch.surface_stress + 1.5 * np.exp(brackets.log_m))
-        self._ends = Ends(deepest, ends.floor, ends.ceiling, ends.turn, ends.rate)
+        deep = problem.batch.surface_stress + 1.5 * np.exp(brackets.log_m)
+        self._ends = problem.ends.take(brackets.lane).above(deep)
         self._target = problem.target[brackets.lane]
         self._gradient = np.zeros((3, brackets.lane.size))
 

@@ -101,8 +101,7 @@ def at_temperature(
         last = np.full(len(batch), 0.0)
         np.maximum.at(last, previous.lane, _BELOW * np.exp(previous.state[LOG_P]))
         last[coarse.trouble] = np.inf
-        there = ends.take(pending)
-        there = Ends(np.minimum(there.deepest, last[pending]), there.floor, there.ceiling, there.turn, there.rate)
+        there = ends.take(pending).above(last[pending])
         found = march(batch.take(pending), temperature[pending], there, finer, meets_base)
         fine = flows_on(batch, temperature, Found(pending[found.lane], found.state, unsettled))
         trouble = np.zeros(len(batch), dtype=bool)

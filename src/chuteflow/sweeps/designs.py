@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +13,10 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.sobol import Sobol
 
 #: Points of a random design that share one stream of numbers.
 _BLOCK = 4096
-_SOBOL_BITS = 40
 _SCALES = ("linear", "log")
 
 
@@ -165,21 +164,12 @@ def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
 
 
 def _sobol(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
-    """Sobol' points with Owen's scrambling: evenly spread, in pieces and as a whole."""
+    """Sobol' points, scrambled: evenly spread, in pieces and as a whole."""
     points, seed = _whole(head, "points", 1, None), _whole(head, "seed", 0, 0)
-    if points > 1 << _SOBOL_BITS:
-        raise InputError(f"design.points = {points}: a sobol design has at most 2^{_SOBOL_BITS}")
+    source = Sobol(len(axes), seed)
 
     def rows(first: int, last: int) -> dict[str, Array]:
-        from scipy.stats import qmc
-
-        source = qmc.Sobol(len(axes), scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(seed))
-        with warnings.catch_warnings():
-            # Only the design as a whole can be balanced, and whoever asks for 1000 points wants 1000.
-            warnings.simplefilter("ignore", UserWarning)
-            if first:
-                source.fast_forward(first)
-            return _at(axes, source.random(last - first))
+        return _at(axes, source.points(first, last))
 
     return Design(points, axes, rows)
 

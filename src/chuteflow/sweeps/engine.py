@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ from chuteflow.theory.laws import LAWS, law
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
 _RESTITUTIONS = 257
+#: What a calculation may end with that is no reason to stop the others.
+_FAILURES = (ChuteflowError, ArithmeticError, ValueError, LookupError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,7 @@ class Chunk:
     reason: Flags
     n_flows: NDArray[np.int32]
     error: Array
-    quantities: Mapping[str, Array]
+    quantities: Mapping[str, NDArray[Any]]
     failures: Mapping[int, str]
     singly: int
 
@@ -67,9 +69,9 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     singly = 0
     for closure, surface, members in _groups(out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)
-        flows, unsettled = _solved(study, batch, out.parameters[study.condition][members])
-        _fill(study, out, members, batch, flows)
-        for lane in np.flatnonzero(unsettled).tolist():
+        solved = _solved(study, batch, out.parameters[study.condition][members])
+        _fill(study, out, members, solved)
+        for lane in np.flatnonzero(solved.unsettled).tolist():
             singly += 1
             _fill_singly(study, out, int(members[lane]), failures)
         _fill_reasons(out, batch, members)
@@ -102,22 +104,25 @@ def _valid(parameters: Mapping[str, Array], condition: str, failures: dict[int, 
         for i in np.flatnonzero(off & valid).tolist():
             failures[i] = f"{name} = {parameters[name][i]:g}: must be from {low:g} to {high:g}"
         valid &= ~off
-    for i in np.flatnonzero(valid).tolist():
-        closure = _word("closure", parameters, i)
-        e = float(parameters["e"][i])
-        if law(closure).knows_slope or not _keeps_meaning(closure, e):
-            try:
-                require_positive(law(closure), e, float(parameters["slope"][i]))
-            except InputError as error:
-                valid[i] = False
-                failures[i] = str(error)
+    for i in np.flatnonzero(valid & ~_surely_meaningful(parameters, valid)).tolist():
+        try:
+            require_positive(law(_word("closure", parameters, i)), parameters["e"][i], parameters["slope"][i])
+        except InputError as error:
+            valid[i] = False
+            failures[i] = str(error)
     return valid
 
 
-def _keeps_meaning(closure: str, e: float) -> bool:
-    place = e * (_RESTITUTIONS - 1)
-    good = _meaningful(closure)
-    return bool(good[int(np.floor(place))] and good[int(np.ceil(place))])
+def _surely_meaningful(parameters: Mapping[str, Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where the law has a meaning at a slightly smaller and a slightly larger restitution, and for every slope."""
+    place = np.where(valid, parameters["e"], 0.0) * (_RESTITUTIONS - 1)
+    below, above = np.floor(place).astype(np.intp), np.ceil(place).astype(np.intp)
+    out = np.zeros(len(valid), dtype=bool)
+    for i, name in enumerate(LAWS):
+        if not law(name).knows_slope:
+            good = _meaningful(name)
+            out |= (parameters["closure"] == i) & good[below] & good[above]
+    return out
 
 
 @lru_cache(maxsize=len(LAWS))
@@ -152,43 +157,89 @@ def _batch(closure: str, surface: str, parameters: Mapping[str, Array], members:
     return Batch.of(closure, surface, slope, e, ew, roughness)
 
 
-def _solved(study: Study, batch: Batch, value: Array) -> tuple[Flows, NDArray[np.bool_]]:
-    if study.condition == "T_surface":
-        return at_temperature(batch, value, study.largest_holdup, study.tolerance)
-    which = _WHICH[study.condition]
-    return at_quantity(batch, which, value, study.surface_temperature, study.largest_holdup, study.tolerance)
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Every flow of a batch (k,), its quantities by name (k,), and the lanes (n,) to be solved one by one."""
+
+    flows: Flows
+    quantities: Mapping[str, Array]
+    unsettled: NDArray[np.bool_]
 
 
-def _fill(study: Study, out: Chunk, members: Indices, batch: Batch, flows: Flows) -> None:
+def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
+    """Every flow of the batch at the condition's values (n,)."""
+    try:
+        if study.condition == "T_surface":
+            flows, unsettled = at_temperature(batch, value, study.largest_holdup, study.tolerance)
+        else:
+            flows, unsettled = at_quantity(
+                batch,
+                _WHICH[study.condition],
+                value,
+                study.surface_temperature,
+                study.largest_holdup,
+                study.tolerance,
+            )
+        return _sound(_Solved(flows, numbers(study.quantities, batch, flows), unsettled))
+    except _FAILURES:
+        if len(batch) == 1:
+            return _Solved(Flows.joined([]), dict.fromkeys(study.quantities, np.empty(0)), np.ones(1, dtype=bool))
+    # One lane must not keep the others from being solved: it is found by halves.
+    half = len(batch) // 2
+    lanes = np.arange(len(batch))
+    one, two = (_solved(study, batch.take(some), value[some]) for some in (lanes[:half], lanes[half:]))
+    return _Solved(
+        Flows.joined([one.flows, replace(two.flows, lane=two.flows.lane + half)]),
+        {name: np.concatenate([one.quantities[name], two.quantities[name]]) for name in study.quantities},
+        np.concatenate([one.unsettled, two.unsettled]),
+    )
+
+
+def _sound(solved: _Solved) -> _Solved:
+    """Without the lanes on which a quantity is not a number: they are solved one by one."""
+    good = np.ones(solved.flows.lane.size, dtype=bool)
+    for values in solved.quantities.values():
+        good &= ~np.isnan(values)
+    if good.all():
+        return solved
+    unsettled = solved.unsettled.copy()
+    unsettled[solved.flows.lane[~good]] = True
+    kept = ~unsettled[solved.flows.lane]
+    values = {name: value[kept] for name, value in solved.quantities.items()}
+    return _Solved(solved.flows.take(kept), values, unsettled)
+
+
+def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
     """Put flows, in order of lanes and along each from hot to cold, into the rows of their points."""
-    counts = np.bincount(flows.lane, minlength=len(batch))
+    flows = solved.flows
+    counts = np.bincount(flows.lane, minlength=len(members))
     out.n_flows[members] = counts
     out.status[members[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
     place = np.arange(flows.lane.size) - (np.cumsum(counts) - counts)[flows.lane]
-    kept = np.flatnonzero(place < study.flows)
-    flows, place = flows.take(kept), place[kept]
-    out.error[members[flows.lane], place] = flows.error
-    for name, values in numbers(study.quantities, batch, flows).items():
-        out.quantities[name][members[flows.lane], place] = values
+    kept = place < study.flows
+    where = members[flows.lane[kept]], place[kept]
+    out.error[where] = flows.error[kept]
+    for name, values in solved.quantities.items():
+        out.quantities[name][where] = values[kept]
 
 
 def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str]) -> None:
     """Solve one point by the search of :func:`chuteflow.flows`."""
     p = out.parameters
-    numbers_ = {CHUTE[name][2]: float(p[name][point]) for name in CHUTE}
-    words = {name: _word(name, p, point) for name in WORDS}
+    slope, e, ew, roughness = (float(p[name][point]) for name in CHUTE)
+    surface, closure = (_word(name, p, point) for name in WORDS)
     condition = {study.condition: float(p[study.condition][point])}
     try:
         found = search(
-            Chute(**numbers_, **words),
+            Chute(slope, e, ew, roughness, surface, closure),
             **condition,
             tolerance=study.tolerance,
             surface_temperature=study.surface_temperature,
             largest_holdup=study.largest_holdup,
         )
-    except ChuteflowError as error:
+    except _FAILURES as error:
         out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER
-        failures[point] = str(error)
+        failures[point] = str(error) or type(error).__name__
         return
     out.n_flows[point] = len(found)
     if len(found) > study.flows:
@@ -204,8 +255,3 @@ def _fill_reasons(out: Chunk, batch: Batch, members: Indices) -> None:
     none = np.flatnonzero((out.n_flows[members] == 0) & (out.status[members] == Status.COMPLETE))
     if none.size:
         out.reason[members[none]] = reasons(batch.take(none))
-
-
-def parameter_words(name: str) -> tuple[str, ...]:
-    """The words that the numbers of a parameter stand for; none for a plain number."""
-    return cast(tuple[str, ...], WORDS[name][0]) if name in WORDS else ()

@@ -12,7 +12,7 @@ has, are looked at more closely. Nothing of a lane depends on the lanes beside i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -25,8 +25,12 @@ from chuteflow.sweeps.zeros import zeros
 Event = Callable[[Along, Indices], Array]
 
 #: Lanes treated at once: so many that the interpreter does not count, so few that they fit the cache.
-LANES = 8192
-_EMPTY, _DENSE = float(np.log(1e-6)), 60.0
+LANES = 16384
+_DENSE = 60.0
+#: Densities X below which a lane may end as an empty one: the first of them at which that can be told.
+_THIN = (1e-2, 1e-3, 1e-6)
+#: By how much p is beyond what the empty state asks for, so that X and the coupling of the heat flux do not matter.
+_FIRMLY = 1.2
 _COLD = 4.0
 _MOST_STEPS = 4000
 #: Parts of a step that is looked at more closely.
@@ -50,12 +54,16 @@ class Accuracy:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, empty
-    with a heat flux above ``ceiling``, beyond which none is met. ``turn`` is p_1."""
+    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
+    emptier, with ln X below ``thin``, p above ``settled`` and the heat flux between ``low`` and ``high``, beyond
+    which no base is met. ``turn`` is p_1, and ``rate`` the fastest of y in p."""
 
     deepest: Array
     floor: Array
-    ceiling: Array
+    thin: Array
+    settled: Array
+    low: Array
+    high: Array
     turn: Array
     rate: Array
 
@@ -64,15 +72,57 @@ class Ends:
         """The ends of the lanes of ``batch`` at normal stresses ``deepest`` (n,)."""
         rate, balance = batch.pace()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
-        conduction, net, meets, _ = batch.at_density(np.full(len(batch), 1e-12))
-        # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux.
-        limit = np.sqrt(np.maximum(2.0 * net * conduction, 0.0))
-        ceiling = np.where(net > 0.0, np.where(meets > limit, 0.0, np.maximum(meets, 0.0)), np.inf)
-        return cls(deepest, floor, ceiling, 1.0 / np.maximum(rate, 1e-3), rate)
+        thin = np.full(len(batch), -np.inf)
+        settled, low, high = np.full((3, len(batch)), np.inf)
+        for x in _THIN:
+            told = _hot_end(batch, x)
+            new = np.isneginf(thin) & np.isfinite(told[0])
+            thin[new] = np.log(x)
+            settled[new], low[new], high[new] = told[:, new]
+        return cls(deepest, floor, thin, settled, low, high, 1.0 / np.maximum(rate, 1e-3), rate)
 
     def take(self, lanes: Indices) -> Ends:
         """The ends of ``lanes``."""
-        return Ends(self.deepest[lanes], self.floor[lanes], self.ceiling[lanes], self.turn[lanes], self.rate[lanes])
+        return Ends(*(part[lanes] for part in vars(self).values()))
+
+    def above(self, deepest: Array) -> Ends:
+        """The same, but no deeper than ``deepest`` (n,)."""
+        return replace(self, deepest=np.minimum(self.deepest, deepest))
+
+    def hot(self, p: Array, state: Array, slope: Array) -> NDArray[np.bool_]:
+        """Which lanes have come to their hot end, by their states and derivatives (ROWS, n)."""
+        emptier = (slope[LOG_X] < 0.0) & (state[LOG_X] < self.thin) & (p > self.settled)
+        return emptier & (state[FLUX] > self.low) & (state[FLUX] < self.high)
+
+
+def _hot_end(batch: Batch, x: float) -> Array:
+    """p, and the least and largest heat flux (3, n), beyond which a lane that is emptier than X meets no base any more;
+    infinite where that cannot be told.
+
+    In the empty state dv/dln p = p^2 net/a - v^2/2, so that v > 1, with which the density falls, lasts where
+    p^2 > a/(2 net); and dy/dp = net - y/p - y^2/(2 a), which keeps y above or below the flux of the base for good
+    where it points away from it.
+    """
+    empty, thin = (batch.at_density(np.full(len(batch), one)) for one in (1e-12, x))
+    # All are nearly straight in X so close to the empty state, and lie between the ends, give or take as much again.
+    (a_low, a_high), (net_low, net_high), (base_low, base_high) = (_span(empty[i], thin[i]) for i in range(3))
+    loses = (net_low > 0.0) & (a_low > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lasts = _FIRMLY * np.sqrt(a_high / (2.0 * net_low))
+        over = loses & (base_low > np.sqrt(2.0 * net_high * a_high))
+        rising = net_low - base_high**2 / (2.0 * a_low)
+        under = loses & ((base_high <= 0.0) | (rising > 0.0))
+        above = np.where(base_high > 0.0, _FIRMLY * base_high / rising, 0.0)
+    out = np.full((3, len(batch)), np.inf)
+    out[:, under] = np.maximum(lasts, above)[under], np.maximum(base_high, 0.0)[under], np.full(under.sum(), np.inf)
+    out[:, over] = lasts[over], np.full(over.sum(), -np.inf), base_low[over]
+    return out
+
+
+def _span(one: Array, other: Array) -> tuple[Array, Array]:
+    """Least and largest of two values, each by their distance further out."""
+    apart = np.abs(other - one)
+    return np.minimum(one, other) - apart, np.maximum(one, other) + apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +218,7 @@ def _march(
             p, y = np.exp(state[LOG_P]), state[FLUX]
             h = h_next
             done = (p >= edges.deepest) | (y < edges.floor) | (state[LOG_X] > _DENSE)
-            done |= (state[LOG_X] < _EMPTY) & (y > edges.ceiling) & (p > edges.turn)
+            done |= edges.hot(p, state, slope)
             stuck = ~(h > 1e-9) | (count > _MOST_STEPS)
             trouble[lane[stuck & ~done]] = True
             done |= stuck

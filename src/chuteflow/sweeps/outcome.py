@@ -7,7 +7,6 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.numerics.chebyshev import Array
 from chuteflow.sweeps.batch import Batch
 
 Flags = NDArray[np.int8]
@@ -61,6 +60,6 @@ def reasons(batch: Batch) -> Flags:
     return out
 
 
-def meanings(flags: type[IntEnum]) -> tuple[Array, str]:
+def meanings(flags: type[IntEnum]) -> tuple[Flags, str]:
     """Values and names of flags, as CF has them."""
     return np.array([f.value for f in flags], dtype=np.int8), " ".join(f.name.lower() for f in flags)

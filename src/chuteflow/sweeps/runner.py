@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from chuteflow.errors import InputError
 from chuteflow.sweeps.store import Marker, Store, StoreError
-from chuteflow.sweeps.work import Done, end_with_parent, work
+from chuteflow.sweeps.work import end_with_parent, work
 
 #: Chunks handed out for each worker: one at work and one waiting.
 _AHEAD = 2
@@ -85,6 +86,9 @@ def cluster_workers(address: str) -> Workers:
     Raises:
         InputError: where dask.distributed is not installed, or nothing answers at the address.
     """
+    import logging
+    from concurrent.futures import CancelledError
+
     try:
         from distributed import Client, KilledWorker
         from distributed.client import FutureCancelledError
@@ -92,33 +96,37 @@ def cluster_workers(address: str) -> Workers:
         raise InputError(
             "--cluster needs dask.distributed: install it with the extra 'cluster', chuteflow[cluster]"
         ) from None
+
+    # What is lost on the way is told here, in a line.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+
+    def connected() -> Any:
+        return Client(address, timeout=10, set_as_default=False)
+
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        with connected() as client:
+            count = max(sum(client.nthreads().values()), 1)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"--cluster {address}: no scheduler answers there ({error or 'timed out'})") from None
-    try:
-        count = max(sum(client.nthreads().values()), 1)
-    finally:
-        client.close()
 
     @contextmanager
     def start() -> Iterator[Executor]:
-        # Keyed by itself, a chunk that another client handed out before would not run.
-        with Client(address, timeout=10, set_as_default=False) as connected:
-            executor = connected.get_executor(pure=False, retries=_MOST_DEATHS)
+        try:
+            client = connected()
+        except OSError:
+            raise StoreError(
+                f"the scheduler at {address} does not answer any more; what is done is kept, and the same command goes "
+                "on from there"
+            ) from None
+        with client:
+            # Keyed by itself, a chunk that another client handed out before would not run.
+            executor = client.get_executor(pure=False, retries=_MOST_DEATHS)
             try:
                 yield executor
             finally:
                 executor.shutdown(wait=False)
 
-    return Workers(count, start, (BrokenExecutor, KilledWorker, FutureCancelledError))
-
-
-def here() -> Workers:
-    """This process itself, one chunk after the other."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    return Workers(1, lambda: ThreadPoolExecutor(1))
+    return Workers(count, start, (BrokenExecutor, KilledWorker, FutureCancelledError, CancelledError))
 
 
 def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marker]:
@@ -159,7 +167,7 @@ def _until_broken(
     store: Store, left: _Left, executor: Executor, workers: Workers, deaths: Counter[int]
 ) -> Iterator[Marker]:
     """Hand out chunks until none is left, which returns False, or the workers have died, which returns True."""
-    out: dict[Future[Done], int] = {}
+    out: dict[Future[Marker], int] = {}
     path = str(store.path.resolve())
     broken = False
     while True:
@@ -177,7 +185,7 @@ def _until_broken(
         for future in wait(out, return_when=FIRST_COMPLETED).done:
             chunk = out.pop(future)
             try:
-                done = future.result()
+                marker = future.result()
             except workers.deaths:
                 broken = True
                 deaths[chunk] += 1
@@ -187,10 +195,12 @@ def _until_broken(
                         "workers more memory"
                     ) from None
                 left.back(chunk)
+            except MemoryError:
+                raise StoreError(f"chunk {chunk} found too little memory: give the study a smaller chunk") from None
             except OSError as error:
                 raise StoreError(
                     f"chunk {chunk} could not be written: {error.strerror or error}; what is done is kept, and the "
                     "same command goes on from there"
                 ) from None
             else:
-                yield done.marker
+                yield marker

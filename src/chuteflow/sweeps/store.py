@@ -201,7 +201,8 @@ class Store:
                 _write(partial / name, self._encoded(variable, arrays[name]))
             text = json.dumps(vars(marker), allow_nan=False)
             _write(partial / "marker", text.encode())
-            for name, variable in variables(self.study).items():
+            # The status last: where that of a chunk is there, so is the rest.
+            for name, variable in sorted(variables(self.study).items(), key=lambda item: item[0] == "status"):
                 place = self.path / name / "c" / str(chunk)
                 if variable.by_flow:
                     place.mkdir(parents=True, exist_ok=True)
@@ -286,11 +287,13 @@ def _lay_out(path: Path, study: Study) -> None:
     """Make the folders and the metadata of a store without a chunk."""
     (path / _OWN / _DONE).mkdir(parents=True)
     (path / _OWN / "study.json").write_text(study.canonical, encoding="utf-8")
+    # An empty group, so that readers that list the folder know what it is.
+    _write_json(path / _OWN / "zarr.json", {"zarr_format": 3, "node_type": "group", "attributes": {}})
     metadata: dict[str, Any] = {}
     for name, variable in variables(study).items():
         (path / name).mkdir()
         metadata[name] = _array_metadata(study, variable)
-        (path / name / "zarr.json").write_text(json.dumps(metadata[name]), encoding="utf-8")
+        _write_json(path / name / "zarr.json", metadata[name])
     group = {
         "zarr_format": 3,
         "node_type": "group",
@@ -298,7 +301,11 @@ def _lay_out(path: Path, study: Study) -> None:
         # With which readers need not list the folder.
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": metadata},
     }
-    (path / "zarr.json").write_text(json.dumps(group), encoding="utf-8")
+    _write_json(path / "zarr.json", group)
+
+
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(content), encoding="utf-8")
 
 
 def _attributes(study: Study) -> dict[str, Any]:

@@ -35,8 +35,8 @@ WORDS = {"surface": (SURFACES, "free"), "closure": (tuple(LAWS), "lun")}
 KINDS = ("interior", "density")
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 #: Points of a chunk: at a given surface temperature, and otherwise, when more has to be done for each.
-CHUNKS = {"T_surface": 16384}
-CHUNK = 2048
+CHUNKS = {"T_surface": 32768}
+CHUNK = 8192
 TOLERANCE = 1e-8
 _MOST_CHUNK, _MOST_POINTS, _MOST_FLOWS = 1 << 20, 1 << 40, 64
 

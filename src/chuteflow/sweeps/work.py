@@ -5,25 +5,16 @@ from __future__ import annotations
 import os
 import threading
 import time
-from dataclasses import dataclass
 
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.store import Marker, Store
 
 
-@dataclass(frozen=True)
-class Done:
-    """A chunk that a worker has done: its marker, and whether it was done before."""
-
-    marker: Marker
-    before: bool
-
-
-def work(path: str, chunk: int) -> Done:
+def work(path: str, chunk: int) -> Marker:
     """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done already."""
     store = Store.opened(path)
     if store.is_done(chunk):
-        return Done(store.marker(chunk), True)
+        return store.marker(chunk)
     begin = time.perf_counter()
     solved = solve_chunk(store.study, chunk)
     marker = Marker(
@@ -35,7 +26,7 @@ def work(path: str, chunk: int) -> Done:
         failures=dict(solved.failures),
     )
     store.put(chunk, solved.arrays(), marker)
-    return Done(marker, False)
+    return marker
 
 
 def end_with_parent() -> None:

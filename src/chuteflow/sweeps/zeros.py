@@ -52,5 +52,6 @@ def zeros(
             by_three = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         t = np.where(quadratic & np.isfinite(by_three), by_three, 0.5)
         t = np.minimum(np.maximum(t, limit), 1.0 - limit)
-        live, a, b, fa, fb, t = (v[going] for v in (live, a, b, fa, fb, t))
+        live = live[going]
+        a, b, fa, fb, t = (v[going] for v in (a, b, fa, fb, t))
     return out

@@ -5,6 +5,7 @@ COMMANDS = {
     "solve": "Every steady flow of a chute at a flux, hold-up, depth or temperature.",
     "curve": "Every family of flows of a chute, with folds and other special points.",
     "boundary": "Folds, onsets of density inversion and changes of interior through a second parameter.",
+    "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
     "sweep": "Every flow of very many chutes, as a study says, into a Zarr store.",
     "figures": "Draw figures of the paper.",

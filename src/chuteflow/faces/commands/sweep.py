@@ -77,9 +77,9 @@ def command(study: str, **given: Any) -> None:
             raise InputError(f"there is no store {given['out']} as yet: leave --status away to make it")
         click.echo(_status(Store.made(given["out"], read_study)))
         return
+    chosen = _chosen(read_study, given["chunks"])
     workers = _workers(given["workers"], given["cluster"])
-    store = Store.made(given["out"], read_study)
-    _run(store, _chosen(read_study, given["chunks"]), workers, alone=given["chunks"] is None)
+    _run(Store.made(given["out"], read_study), chosen, workers, alone=given["chunks"] is None)
 
 
 def _workers(count: int | None, cluster: str | None) -> Workers:
