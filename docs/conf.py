@@ -17,7 +17,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",
     "docstrings",
     "equations",
@@ -25,16 +24,23 @@ extensions = [
     "commands",
     "tables",
     "pictures",
+    "convergence",
+    "present",
+    "offline",
 ]
+if "quick" not in tags:  # noqa: F821, Sphinx gives it
+    extensions.append("sphinx.ext.viewcode")
 exclude_patterns = ["_ext"]
-# Pages of a subject are gathered by patterns, and a subject may have none.
-suppress_warnings = ["toc.empty_glob"]
+
+# Two hyphens begin an option, and are not to become a dash.
+smartquotes = False
 
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = {"Array": "Array", "ArrayLike": "ArrayLike", "Field": "Field"}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 100
 add_module_names = False
@@ -46,3 +52,4 @@ html_static_path = ["_static"]
 html_css_files = ["chuteflow.css"]
 html_copy_source = False
 html_show_copyright = False
+html_show_sphinx = False

@@ -1,48 +1,120 @@
-"""Every example in the README and the documents runs as it stands."""
+"""Every example in the README and the documents runs as it stands, and prints what the page shows."""
 
+import json
 import re
-import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from chuteflow.faces.cli import main
+
+from .run_page import agree, examples
+
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md"))]
+RUNNER = Path(__file__).with_name("run_page.py")
 
 
-def examples(language):
-    for page in PAGES:
-        for number, match in enumerate(BLOCK.finditer(page.read_text())):
-            if match.group(1) == language:
-                yield pytest.param(match.group(2), id=f"{page.relative_to(ROOT)}-{number}")
+def name(page):
+    return str(page.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("code", list(examples("python")))
-def test_python_example(code, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+@pytest.mark.parametrize("page", [p for p in PAGES if any(examples(p.read_text(encoding="utf-8")))], ids=name)
+def test_examples(page, tmp_path):
+    for file in page.parent.glob("*.py"):  # what the page tells to save
+        if page.is_relative_to(DOCS) and file.parent != DOCS:
+            shutil.copy(file, tmp_path)
+    command = [sys.executable, "-W", "error", RUNNER, page]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("commands", list(examples("sh")))
-def test_shell_example(commands, tmp_path):
-    program = Path(sys.executable).with_name("chuteflow")
-    for line in commands.splitlines():
-        words = shlex.split(line, comments=True)
-        if not words:
-            continue
-        assert words[0] == "chuteflow"
-        done = subprocess.run([program, *words[1:]], cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        assert done.stdout
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+def test_every_page_of_the_start_is_run():
+    shown = [example.output for example in examples((DOCS / "start.md").read_text(encoding="utf-8"))]
+    assert len(shown) >= 3
+    assert None not in shown
+
+
+def documented_names():
+    text = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
+    return set(re.findall(r"`([\w-]+)`", text))
+
+
+def names_in(value):
+    if isinstance(value, dict):
+        return set(value) | {name for inner in value.values() for name in names_in(inner)}
+    return {name for inner in value for name in names_in(inner)} if isinstance(value, list) else set()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "solve {chute} --flux 3 --diameter 0.001 --density 2500",
+        "curve {chute} --points 8 --search-temperature 0.1:10",
+        "hot {chute}",
+        "boundary --slope 0.29:0.3 --e 0.8 --ew 0.8 --roughness 0.6 --samples 2 --search-temperature 0.1:10",
+        "claims --only slip-limit",
+        "relax {chute} --flux 3 --duration 1",
+    ],
+    ids=lambda command: command.split()[0],
+)
+def test_the_page_on_json_has_every_name(command, capsys):
+    words = command.format(chute="--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6").split()
+    assert main([*words, "--json"]) == 0
+    assert names_in(json.loads(capsys.readouterr().out)) <= documented_names()
+
+
+# The runner itself
+
+
+@pytest.mark.parametrize(
+    ("shown", "written", "same"),
+    [
+        ("a 1.25\n", "a 1.25\n", True),
+        ("a 1.25\n", "a 1.26\n", True),
+        ("a 1.25\n", "a 1.27\n", False),
+        ("a  1.25\n", "a 1.25\n", True),
+        ("a 1.25\n", "b 1.25\n", False),
+        ("3 flows\n", "2 flows\n", False),
+        ("error 1e-12\n", "error 3e-11\n", True),
+        ("error 1e-12\n", "error 3e-07\n", False),
+        ("one\n...\nthree\n", "one\ntwo\nthree\n", True),
+        ("one\n...\nthree\n", "one\ntwo\nthree\nfour\n", False),
+        ("...\nthree\n", "one\ntwo\nthree\n", True),
+        ("one\n...\n", "one\ntwo\n", True),
+        ("one\n...\nthree\n...\nfive\n", "one\ntwo\nthree\nfour\nfive\n", True),
+        ("one\n...\n6\n...\nfive\n", "one\ntwo\nthree\nfour\nfive\n", False),
+        ("one\n", "one\ntwo\n", False),
+        ("one\ntwo\n", "one\n", False),
+    ],
+)
+def test_output_is_compared(shown, written, same):
+    assert agree(shown, written) == same
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "```python\nprint(1)\n```\n\n```output\n2\n```\n",
+        "```python\nraise ValueError\n```\n",
+        "```sh\nchuteflow solve\n```\n",
+        "```sh\nchuteflow --version  # exit code 2\n```\n",
+        "```sh\nls\n```\n",
+    ],
+)
+def test_a_wrong_example_is_seen(page, tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text(page, encoding="utf-8")
+    done = subprocess.run([sys.executable, RUNNER, path], cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == 1

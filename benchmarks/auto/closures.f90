@@ -11,11 +11,12 @@ contains
   type(coefficients) function closure(nu)
     ! compressibility is g1/nu, and dissipation g5/nu**2
     double precision, intent(in) :: nu
-    double precision :: g0, rise, x, f, root_pi
+    double precision :: g0, gap, rise, x, f, root_pi
     root_pi = sqrt(pi)
     f = 1d0 + e
-    g0 = (1d0 - nu/densest)**(-2.5d0*densest)
-    rise = 2.5d0/(1d0 - nu/densest)
+    gap = max(1d0 - nu/densest, 1d-6) ! finite for a trial beyond the densest packing, so that a step can be refused
+    g0 = gap**(-2.5d0*densest)
+    rise = 2.5d0/gap
     x = nu*g0
     closure%g0 = g0
     closure%compressibility = 1d0 + 2d0*f*x

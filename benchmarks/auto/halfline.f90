@@ -12,7 +12,7 @@ subroutine func(ndim, u, icp, par, ijac, f, dfdu, dfdp)
   double precision :: nu, t, q, g1_slope, root_t, t_z, nu_z, work
   nu = u(1); t = u(2); q = u(3)
   g = closure(nu)
-  root_t = sqrt(t)
+  root_t = sqrt(max(t, 1d-12)) ! as above: a trial may be negative
   g1_slope = g%compressibility + nu*g%compressibility_slope
   ! q = -g3 sqrt(T) T' + g4 T**1.5 nu', with (g1 T)' = -nu
   t_z = -(q/root_t + g%g4*nu/g1_slope)/(g%g3 + g%g4*nu*g%compressibility/g1_slope)

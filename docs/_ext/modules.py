@@ -60,14 +60,20 @@ class Package(_Generated):
 
 
 class Layer(_Generated):
-    """Every module of the layer that the argument names; what the page of the package has is left out."""
+    """Every module of the layer that the argument names; what the page of the package has is left out.
+
+    The content, if there is any, names the modules that are shown, one a line.
+    """
 
     required_arguments = 1
+    has_content = True
 
     def lines(self) -> Iterator[str]:
         """One section for each module."""
         left_out = ", ".join(public_names())
-        for name in modules_of(self.arguments[0]):
+        layer = self.arguments[0]
+        chosen = [f"chuteflow.{layer}.{name}" for name in self.content] or modules_of(layer)
+        for name in chosen:
             title = name.removeprefix("chuteflow.")
             yield from (title, "-" * len(title), "")
             yield f".. automodule:: {name}"

@@ -8,17 +8,25 @@ from sphinx.util.docutils import SphinxDirective
 
 import chuteflow
 
+#: The content of a cell.
+Cell = str | list[nodes.Node]
+
 
 class FromPackage(SphinxDirective):
     """A directive whose result depends on the code of the package."""
+
+    @property
+    def quick(self) -> bool:
+        """Whether this is a build that leaves out what takes long."""
+        return "quick" in self.env.app.tags
 
     def note_package(self) -> None:
         """Let the page depend on every module."""
         for path in Path(chuteflow.__file__).parent.rglob("*.py"):
             self.env.note_dependency(str(path))
 
-    def table(self, heading: Sequence[str], rows: Iterable[Sequence[str]], widths: Sequence[int]) -> nodes.table:
-        """A table whose cells are inline markup of the page."""
+    def table(self, heading: Sequence[Cell], rows: Iterable[Sequence[Cell]], widths: Sequence[int]) -> nodes.table:
+        """A table whose cells are inline markup of the page, or nodes."""
         group = nodes.tgroup(cols=len(widths))
         group += [nodes.colspec(colwidth=width) for width in widths]
         head, body = nodes.thead(), nodes.tbody()
@@ -29,12 +37,15 @@ class FromPackage(SphinxDirective):
         table += group
         return table
 
-    def _row(self, cells: Sequence[str]) -> nodes.row:
+    def _row(self, cells: Sequence[Cell]) -> nodes.row:
         row = nodes.row()
         for cell in cells:
             entry = nodes.entry()
-            found, messages = self.parse_inline(cell)
-            entry += nodes.paragraph("", "", *found)
-            entry += messages
+            if isinstance(cell, str):
+                found, messages = self.parse_inline(cell)
+                entry += nodes.paragraph("", "", *found)
+                entry += messages
+            else:
+                entry += cell
             row += entry
         return row

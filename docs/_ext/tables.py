@@ -3,12 +3,13 @@
 from collections import Counter
 from collections.abc import Mapping
 
+from docstrings import linked
 from docutils import nodes
 from package import FromPackage
 from sphinx.application import Sphinx
 
 from chuteflow.analysis.results import KINDS
-from chuteflow.paper.claims import VERDICTS, check, shown
+from chuteflow.paper.claims import CLAIMS, VERDICTS, check, shown
 from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity
 from chuteflow.theory.laws import LAWS
 
@@ -26,7 +27,15 @@ class Quantities(FromPackage):
         self.note_package()
         chosen: Mapping[str, Quantity] = {"numbers": NUMBERS, "fields": FIELDS}[self.arguments[0]]
         rows = [
-            (f"`{q.name}`", f"`{q.symbol}`", f"${q.latex}$", scale(q), q.unit, q.description, q.equation)
+            (
+                f"`{q.name}`",
+                f"`{q.symbol}`",
+                f"${q.latex}$",
+                scale(q),
+                q.unit,
+                q.description,
+                linked(q.equation, "{{eqn}}`{}`"),
+            )
             for q in chosen.values()
         ]
         heading = ("attribute", "in JSON", "symbol", "scale", "SI", "meaning", "paper")
@@ -68,31 +77,31 @@ class SpecialPoints(FromPackage):
 
 
 class Claims(FromPackage):
-    """Every claim, computed now, with its verdict; a count of the verdicts first."""
+    """Every claim, computed now, with its verdict; a count of the verdicts first. In a quick build one of them."""
 
     def run(self) -> list[nodes.Node]:
         """The sections."""
         self.note_package()
-        found = list(check())
+        found = list(check([next(iter(CLAIMS))] if self.quick else None))
         counted = Counter(verdict.verdict for verdict in found)
         said = ", ".join(f"{counted[verdict]} {verdict}" for verdict in VERDICTS if counted[verdict])
         rows = [
-            (claim.source, claim.statement, shown(claim.printed), shown(claim.computed), claim.verdict, claim.reason)
+            (
+                [_plain(f"{claim.statement} ({claim.source})")],
+                [_plain(shown(claim.printed))],
+                [_plain(shown(claim.computed))],
+                [nodes.paragraph("", "", nodes.strong("", claim.verdict)), _plain(claim.reason)],
+            )
             for claim in found
         ]
-        group = [tuple(map(nodes.unescape, row)) for row in rows]
-        return [
-            nodes.paragraph("", f"{len(found)} claims: {said}."),
-            self.plain_table(("place", "statement", "printed", "computed", "verdict", "reason"), group),
-        ]
+        table = self.table(("statement", "printed", "computed", "verdict"), rows, (30, 13, 17, 40))
+        table["classes"] = ["claims"]
+        return [_plain(f"{len(found)} claims: {said}."), table]
 
-    def plain_table(self, heading: tuple[str, ...], rows: list[tuple[str, ...]]) -> nodes.table:
-        """A table of plain text, in which nothing is markup."""
-        table = self.table(heading, [("",) * len(heading)] * len(rows), (8, 26, 13, 13, 10, 30))
-        entries = list(table.findall(nodes.entry))[len(heading) :]
-        for entry, text in zip(entries, (cell for row in rows for cell in row), strict=True):
-            entry.children = [nodes.paragraph(text, text)]
-        return table
+
+def _plain(text: str) -> nodes.paragraph:
+    """A paragraph in which nothing is markup."""
+    return nodes.paragraph("", text)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

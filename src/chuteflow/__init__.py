@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from chuteflow.analysis.curve import curve
+    from chuteflow.analysis.domains.maps import Domain, domain
     from chuteflow.analysis.enumeration import flows
     from chuteflow.analysis.hot import HotModel, hot
     from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
     from chuteflow.faces.files import load, save
+    from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
@@ -24,6 +26,7 @@ _HOMES = {
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "analysis.results",
+    "Domain": "analysis.domains.maps",
     "Flow": "steady.flow",
     "FlowSet": "analysis.results",
     "InputError": "errors",
@@ -34,12 +37,15 @@ _HOMES = {
     "Searched": "analysis.results",
     "SolveError": "errors",
     "SpecialPoint": "analysis.results",
+    "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
+    "domain": "analysis.domains.maps",
     "flows": "analysis.enumeration",
     "hot": "analysis.hot",
     "load": "faces.files",
     "save": "faces.files",
+    "stability_of": "stability.verdict",
 }
 
 __all__ = [
@@ -48,6 +54,7 @@ __all__ = [
     "Chute",
     "ChuteflowError",
     "Curve",
+    "Domain",
     "Flow",
     "FlowSet",
     "HotModel",
@@ -58,12 +65,15 @@ __all__ = [
     "Searched",
     "SolveError",
     "SpecialPoint",
+    "Stability",
     "__version__",
     "curve",
+    "domain",
     "flows",
     "hot",
     "load",
     "save",
+    "stability_of",
 ]
 
 

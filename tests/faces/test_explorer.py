@@ -1,26 +1,33 @@
 """The explorer's server: its answers, what it refuses, and that it stays up."""
 
+import asyncio
 import csv
 import io
 import json
+import math
 import random
 import re
+import shlex
 import socket
-import subprocess
-import sys
 import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 import chuteflow
 from chuteflow.errors import InputError
-from chuteflow.faces.explorer import lanes, queries
+from chuteflow.faces.cli import main
+from chuteflow.faces.explorer import growth, lanes, queries, sentences
 from chuteflow.faces.explorer.server import PAGE, application, bound, host_of
+from chuteflow.stability.modes import Disturbances
+from chuteflow.steady.chute import SURFACES
+from chuteflow.theory.laws import LAWS
 
 PAPER = {"slope": "0.3", "e": "0.8", "ew": "0.8", "roughness": "0.6"}
 
@@ -37,8 +44,12 @@ def test_the_flows_are_those_of_the_library(client):
     assert [flow["T_surface"] for flow in given["flows"]] == pytest.approx(
         [flow.surface_temperature for flow in flows], rel=1e-6
     )
-    assert given["says"] == "Three flows share the flux Q = 3."
-    assert given["flows"][0]["words"].startswith("hot, dilute, deep: ")
+    assert given["says"] == (
+        "Three flows share the flux Q = 3: one hot, dilute, deep; one in between; "
+        "one cold, dense, shallow, densest above its base."
+    )
+    assert given["flows"][0]["name"] == "hot, dilute, deep"
+    assert given["flows"][2]["kinds"] == "density inverted, interior dissipative"
 
 
 def test_the_profiles_are_those_of_the_flow(client):
@@ -47,6 +58,23 @@ def test_the_profiles_are_those_of_the_flow(client):
     profile = flow.profile(entry["profile"]["z"])
     assert entry["profile"]["nu"] == pytest.approx(profile.volume_fraction.tolist(), abs=1e-6)
     assert entry["profile"]["u"] == pytest.approx(profile.velocity.tolist(), rel=1e-5)
+
+
+def test_work_conduction_and_dissipation_balance_at_each_height(client):
+    entry = client.get("/ask/flows", params=PAPER | {"Q": "3"}).json()["flows"][1]
+    profile, budget = entry["profile"], entry["budget"]
+    z, work, loss = (np.array(profile[name]) for name in ("z", "production", "dissipation"))
+    assert integral(work, z) == pytest.approx(budget["shear_work"], rel=2e-3)
+    assert integral(loss, z) == pytest.approx(budget["dissipation"], rel=2e-3)
+    # Conduction, the rest of the balance, is what the base gives.
+    assert integral(loss - work, z) == pytest.approx(budget["heat_from_base"], rel=1e-2)
+    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[1]
+    flux = flow.profile(z[:2]).heat_flux
+    assert (loss - work)[:2].mean() == pytest.approx((flux[0] - flux[1]) / (z[1] - z[0]), rel=1e-3)
+
+
+def integral(values, z):
+    return float((np.diff(z) * (values[1:] + values[:-1]) / 2).sum())
 
 
 def test_the_curve_says_how_many_flows_share_a_flux(client):
@@ -65,16 +93,107 @@ def test_no_flow_is_an_answer_with_its_reason(client):
     assert given.json()["says"].startswith("No flow carries Q = 3: ")
 
 
-def test_the_recipes_give_the_same_flows(client):
-    recipes = client.get("/ask/flows", params=PAPER | {"Q": "3.25"}).json()["recipes"]
-    namespace = {}
-    exec(recipes["python"], namespace)
-    run = subprocess.run(
-        [sys.executable, "-m", *recipes["command"].split(), "--json"], capture_output=True, text=True, check=True
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"surface": "interface", "Q": "2.75", "diameter": "0.0007", "density": "2650"}],
+    ids=["dimensionless", "SI beneath an interface"],
+)
+def test_the_recipes_and_the_downloads_give_the_same_tables(client, more, tmp_path, monkeypatch):
+    query = PAPER | {"Q": "3"} | more
+    tables = {
+        f"chuteflow-{what}.csv": client.get("/ask/export", params=query | {"what": what, "format": "csv"}).content
+        for what in ("profiles", "curve")
+    }
+    recipes = client.get("/ask/flows", params=query).json()["recipes"]
+    monkeypatch.chdir(tmp_path)
+    exec(recipes["python"], {})
+    assert {name: (tmp_path / name).read_bytes() for name in tables} == tables
+    for name in tables:
+        (tmp_path / name).unlink()
+    for line in recipes["command"].splitlines():
+        program, *arguments = shlex.split(line)
+        assert program == "chuteflow"
+        assert main(arguments) == 0
+    assert {name: (tmp_path / name).read_bytes() for name in tables} == tables
+
+
+def test_sentences_are_in_the_units_of_the_grains(client):
+    grains = {"diameter": "0.001", "density": "2500"}
+    given = client.get("/ask/flows", params=PAPER | {"Q": "3"} | grains).json()
+    flux = 3.0 * chuteflow.Scales(0.001, 2500.0).factor("mass_flux", 0.3)
+    assert f"Q = {flux:.5g} kg/m/s" in given["says"]
+    assert given["flows"][0]["Q"] == pytest.approx(3.0)
+    assert "kg/m/s" in client.get("/ask/curve", params=PAPER | grains).json()["says"]
+
+
+def test_a_column_of_the_map_tells_what_the_curve_tells(client):
+    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": str((0.3 - 0.05) / 0.65)}
+    column = client.get("/ask/map", params=query).json()
+    assert (column["outer"], column["inner"], column["at"]) == ("slope", "roughness", pytest.approx(0.3))
+    assert len(column["codes"]) == len(column["stops"]) + 1
+    for roughness, count in ((0.6, 3), (0.82, 2)):
+        code = column["codes"][sum(stop < roughness for stop in column["stops"])]
+        says = client.get("/ask/curve", params=PAPER | {"roughness": str(roughness)}).json()["says"]
+        assert code[column["names"].index("most")] == count == max(map(int, re.findall(r"(\d+) for Q", says)))
+    hot = column["names"].index("hot")
+    edge = next(
+        stop
+        for stop, pair in zip(column["stops"], pairwise(column["codes"]), strict=True)
+        if pair[0][hot] != pair[1][hot]
     )
-    from_command = [flow["Q"] for flow in json.loads(run.stdout)["flows"]]
-    assert from_command == [flow.mass_flux for flow in namespace["flows"]]
-    assert from_command == pytest.approx([3.25] * 3)
+    # Hot flows end where lambda = 3 or where the base gives nothing, in closed form.
+    sides = [chuteflow.hot(chuteflow.Chute(0.3, 0.8, 0.8, edge + off)).exists for off in (-0.004, 0.004)]
+    assert sides == [True, False]
+
+
+def test_a_map_whose_columns_run_along_x(client):
+    query = {"e": "0.8", "ew": "0.8", "x": "roughness", "y": "slope", "place": "0.4"}
+    column = client.get("/ask/map", params=query).json()
+    assert (column["outer"], column["inner"]) == ("slope", "roughness")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"x": "Q"}, "x = 'Q': choose one of slope, e, ew, roughness"),
+        ({"y": "slope"}, "both slope"),
+        ({"place": "2"}, "place = 2: must be from 0 to 1"),
+        ({"e": "7"}, "restitution e = 7"),
+    ],
+)
+def test_a_bad_map_is_refused(client, change, said):
+    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4"} | change
+    given = client.get("/ask/map", params=query)
+    assert given.status_code == 400
+    assert said in given.json()["error"]
+
+
+def test_an_unstable_flow_and_its_fastest_wave(client):
+    given = client.get("/ask/stability", params=PAPER | {"Q": "3", "flow": "1"}).json()
+    assert given["state"] == "unstable"
+    assert given["says"].startswith("unstable: waves across the slope, growth 0.001")
+    assert given["waves"] == "36 waves of 4.5 d to 2500 d tried"
+    fastest = given["fastest"]
+    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[1]
+    (mode,) = Disturbances(flow).modes(0.0, 2.0 * math.pi / fastest["length"])
+    assert mode.growth == pytest.approx(fastest["growth"], abs=1e-6)
+
+
+def test_a_flow_that_no_wave_grows_on_is_called_stable(monkeypatch):
+    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[1]
+    # Short waves decay on every flow.
+    monkeypatch.setattr(growth, "_WAVENUMBERS", (1.0, 2.0))
+    verdict = growth.verdict(flow)
+    assert (verdict.state, verdict.fastest, verdict.tried.waves) == ("stable", None, 6)
+    assert sentences.of_stability(verdict, flow.chute, None) == "stable: none of the waves tried grows"
+
+
+def test_stability_that_cannot_be_posed_is_not_known(client):
+    query = PAPER | {"Q": "3", "flow": "0", "surface": "interface"}
+    given = client.get("/ask/stability", params=query).json()
+    assert given["state"] == "unknown"
+    assert given["says"].startswith("not known whether it is stable: ")
+    assert client.get("/ask/stability", params=query | {"flow": "7"}).status_code == 400
 
 
 @pytest.mark.parametrize("what", ["profiles", "curve"])
@@ -99,6 +218,8 @@ def test_exports(client, what):
         (PAPER | {"Q": "3", "e": "1.2"}, "restitution e = 1.2"),
         (PAPER | {"Q": "3", "surface": "wet"}, "unknown surface 'wet'"),
         (PAPER | {"Q": "3", "points": "9999999"}, "unknown parameter 'points'"),
+        (PAPER | {"Q": "3", "diameter": "0.001"}, "SI units need diameter and density"),
+        (PAPER | {"Q": "3", "diameter": "0.001", "density": "-1"}, "density = -1: must be from"),
     ],
 )
 def test_a_bad_query_gets_one_clear_line(client, query, said):
@@ -126,6 +247,12 @@ def test_another_host_is_refused(client, host):
     given = client.get("/", headers={"host": host})
     assert given.status_code == 400
     assert "is not served" in given.json()["error"]
+
+
+def test_pages_of_other_servers_are_refused(client):
+    headers = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "cors"}
+    assert client.get("/ask/flows", params=PAPER | {"Q": "3"}, headers=headers).status_code == 403
+    assert client.get("/", headers=headers | {"sec-fetch-mode": "navigate"}).status_code == 200
 
 
 def test_hosts_are_read_without_their_port():
@@ -156,19 +283,25 @@ def test_every_preset_is_a_case_that_works(client):
 
 
 def test_every_control_is_explained(client):
-    controls = client.get("/about").json()["controls"]
-    assert list(controls) == ["slope", "e", "ew", "roughness", "Q"]
-    assert all(control["meaning"].endswith(".") and control["low"] < control["high"] for control in controls.values())
+    about = client.get("/about").json()
+    assert list(about["controls"]) == ["slope", "e", "ew", "roughness", "Q"]
+    assert all(control["low"] < control["high"] for control in about["controls"].values())
+    assert {name: list(choice["options"]) for name, choice in about["choices"].items()} == {
+        "surface": list(SURFACES),
+        "closure": list(LAWS),
+    }
+    for control in (*about["controls"].values(), *about["choices"].values()):
+        assert control["meaning"].endswith(".")
 
 
-def test_a_question_that_takes_too_long_is_ended_and_the_next_answered(monkeypatch):
+def test_a_question_that_takes_too_long_is_ended_and_the_next_answered():
     lane = lanes.Lane(limit=0.001)
     try:
-        late = lane._put("curve", PAPER)
+        late = lane.put("curve", PAPER)
         assert late.status == 504
         assert "no answer within" in json.loads(late.body)["error"]
         lane._limit = 60.0
-        assert lane._put("flows", PAPER | {"Q": "3"}).status == 200
+        assert lane.put("flows", PAPER | {"Q": "3"}).status == 200
     finally:
         lane.close()
 
@@ -176,13 +309,32 @@ def test_a_question_that_takes_too_long_is_ended_and_the_next_answered(monkeypat
 def test_a_process_that_dies_is_replaced():
     lane = lanes.Lane(limit=60.0)
     try:
-        assert lane._put("flows", PAPER | {"Q": "3"}).status == 200
+        assert lane.put("flows", PAPER | {"Q": "3"}).status == 200
         assert lane._process is not None
         lane._process.kill()
         lane._process.join()
-        assert lane._put("flows", PAPER | {"Q": "3"}).status == 200
+        assert lane.put("flows", PAPER | {"Q": "3"}).status == 200
     finally:
         lane.close()
+
+
+def test_a_question_that_nobody_waits_for_is_broken_off_and_one_that_waits_is_not_begun():
+    async def asked():
+        async def gone():
+            return True
+
+        lane = lanes.Lane(limit=60.0, nice=5, breaks_off=True)
+        try:
+            assert lane.put("flows", PAPER | {"Q": "3"}).status == 200
+            began = lane._process
+            several = [lane.ask("stability", PAPER | {"Q": q, "flow": "0"}, gone) for q in ("3", "3.1")]
+            left = await asyncio.gather(*several)
+            after = await lane.ask("flows", PAPER | {"Q": "3.2"})
+            return [answer.status for answer in (*left, after)], lane._process is began
+        finally:
+            lane.close()
+
+    assert asyncio.run(asked()) == ([499, 499, 200], False)
 
 
 def test_a_port_in_use_is_said():
@@ -216,7 +368,8 @@ def test_it_starts_within_a_second_and_ends_at_ctrl_c(served):
 def random_path(rng):
     names = ["slope", "e", "ew", "roughness", "Q", "surface", "closure", "what", "format", "%00", "x"]
     values = ["0.3", "0.8", "3", "-1", "1e999", "nan", "", "free", "lun", "%ff", "'", "0.31", 1500 * "1"]
-    question = rng.choice(["ask/flows", "ask/flows", "ask/curve", "ask/nothing", "about", "page/main.js", "..", ""])
+    asked = ["ask/flows", "ask/flows", "ask/curve", "ask/map", "ask/stability", "ask/nothing"]
+    question = rng.choice([*asked, "about", "page/main.js", "..", ""])
     sound = PAPER | {"slope": f"{rng.uniform(0.28, 0.33):.4f}"} | ({"Q": "3"} if question == "ask/flows" else {})
     if rng.random() < 0.4:
         return f"{question}?{urllib.parse.urlencode(sound)}"

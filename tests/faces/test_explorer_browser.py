@@ -1,8 +1,11 @@
 """The explorer in a real browser: dragging, the address, the keyboard, exports, and who is asked for anything."""
 
-import os
+import re
 import shutil
-from urllib.parse import parse_qs, urlsplit
+from pathlib import Path
+from statistics import median
+from urllib.parse import urlsplit
+from xml.etree import ElementTree
 
 import pytest
 from playwright.sync_api import expect, sync_playwright
@@ -47,10 +50,6 @@ def opened(page, query=""):
     return page
 
 
-def state(page):
-    return {name: values[0] for name, values in parse_qs(urlsplit(page.url).query).items()}
-
-
 def drag(page, locator, start, end, steps=20):
     box = locator.bounding_box()
     across, up = (lambda at: box["x"] + at[0] * box["width"]), (lambda at: box["y"] + at[1] * box["height"])
@@ -65,29 +64,55 @@ def drag(page, locator, start, end, steps=20):
 
 def test_the_page_says_what_one_sees(page):
     opened(page)
-    expect(page.locator("#says")).to_have_text("Three flows share the flux Q = 3.")
+    expect(page.locator("#says")).to_contain_text("Three flows share the flux Q = 3: one hot, dilute, deep;")
     expect(page.locator("#flows label")).to_have_count(3)
     expect(page.locator("#curve .dot")).to_have_count(3)
+    colours = [dot.get_attribute("fill") for dot in page.locator("#curve .dot").all()]
     for svg in page.locator("#profiles svg").all():
-        expect(svg.locator(".line")).to_have_count(3)
+        assert [line.get_attribute("stroke") for line in svg.locator(".line").all()] == colours
+    swatches = page.locator("#flows .swatch circle").all()
+    assert [swatch.get_attribute("fill") for swatch in swatches] == colours
+    assert page.locator("#curve .special").count() >= 3  # folds and the onset of inversion
+    expect(page.locator("#budget .line")).to_have_count(3)
+    expect(page.locator("#budget-words")).to_contain_text("slip on the base 67 %")
 
 
 def test_dragging_the_slope_redraws_and_the_last_position_wins(page):
     opened(page)
     slider = page.locator("#slope-slider")
     drag(page, slider, (0.38, 0.5), (0.36, 0.5))
-    page.wait_for_url("**slope=0.2**")
-    slope = float(state(page)["slope"])
+    slope = float(page.locator("#slope").input_value())
+    assert 0.27 < slope < 0.29
     assert float(slider.input_value()) == pytest.approx(1000 * (slope - 0.05) / 0.65, abs=1.0)
+    page.wait_for_url(f"**slope={slope!r}**")
     # What is shown in the end belongs to where the slider stands.
     expect(page.locator("#command")).to_contain_text(f"--slope {slope!r} ")
+    expect(page.locator("#map-here")).to_have_attribute("cx", re.compile(r"\d"))
+
+
+def test_of_many_positions_at_once_the_last_wins_and_few_are_asked(page):
+    opened(page)
+    page.asked.clear()
+    page.evaluate(
+        """() => {
+        const slider = document.querySelector('#slope-slider');
+        for (let place = 340; place <= 400; place++) {
+            slider.value = place;
+            slider.dispatchEvent(new Event('input'));
+        }
+    }"""
+    )
+    expect(page.locator("#command")).to_contain_text("--slope 0.31 ")
+    asked = [url for url in page.asked if "ask/flows" in url]
+    assert len(asked) == 2  # the first position, and the last
+    assert "slope=0.31&" in asked[-1]
 
 
 def test_the_address_holds_the_state(page):
     opened(page, "?slope=0.28&Q=2.5&surface=interface&si=1&d=2&theme=dark&flow=0")
     expect(page.locator("#slope")).to_have_value("0.28")
     expect(page.locator("#surface")).to_have_value("interface")
-    expect(page.locator("#says")).to_contain_text("2.5")
+    expect(page.locator("#command")).to_contain_text("--flux 2.5 --diameter 0.002 --density 2500.0")
     expect(page.locator("html")).to_have_attribute("data-theme", "dark")
     expect(page.locator("#d")).to_be_visible()
     says = page.locator("#says").inner_text()
@@ -117,7 +142,6 @@ def test_moving_along_the_curve_moves_the_flux(page):
     box = curve.bounding_box()
     start = ((dot["x"] + dot["width"] / 2 + 12 - box["x"]) / box["width"], (dot["y"] + 10 - box["y"]) / box["height"])
     drag(page, curve, start, (start[0] + 0.05, start[1] + 0.02))
-    page.wait_for_function("document.querySelector('#Q').value > 3.05")
     assert 3.05 < float(page.locator("#Q").input_value()) < 5.1
     curve.press("ArrowLeft")
     expect(page.locator("#says")).to_contain_text("share the flux")
@@ -151,16 +175,105 @@ def test_si_units(page):
     assert float(page.locator("#Q").input_value()) == pytest.approx(3.0 * scale, rel=1e-4)
     page.locator("#Q").fill(str(4.0 * scale))
     page.locator("#Q").press("Enter")
-    expect(page.locator("#says")).to_contain_text("Q = 4")
+    expect(page.locator("#says")).to_contain_text(f"Q = {4.0 * scale:.5g} kg/m/s")
+    expect(page.locator("#command")).to_contain_text("--flux 4.0 --diameter 0.001 --density 2500.0")
 
 
 def test_exports_are_downloaded(page):
-    opened(page)
-    for what, kind in (("profiles", "csv"), ("curve", "csv"), ("profiles", "png"), ("curve", "svg")):
+    opened(page, "?slope=0.31&flow=2")
+    for export in ("profiles-csv", "curve-svg", "chute-svg", "chute-png"):
+        what, kind = export.split("-")
         with page.expect_download() as download:
-            page.locator(f"#exports a[href*='what={what}'][href*='format={kind}']").click()
+            page.locator(f"[data-export={export}]").click()
         assert download.value.suggested_filename == f"chuteflow-{what}.{kind}"
-        assert os.path.getsize(download.value.path()) > 1000
+        content = Path(download.value.path()).read_bytes()
+        assert len(content) > 1000
+        if kind == "csv":
+            assert b"slope = 0.31" in content
+        if export == "chute-svg":
+            root = ElementTree.fromstring(content)
+            assert len(root.findall(".//{*}circle")) > 25
+            assert "not a simulation" in root.findtext("{*}title", "")
+
+
+def test_the_map_is_drawn_and_its_cross_hair_moves_the_chute(page):
+    opened(page)
+    expect(page.locator("#map-key")).to_contain_text("At most this many flows share one flux", timeout=60_000)
+    assert page.locator("#map g > path[fill]").count() >= 3
+    page.locator("#map").scroll_into_view_if_needed()
+    box, here = page.locator("#map").bounding_box(), page.locator("#map-here").bounding_box()
+    start = [(here["x"] + 4.5 - box["x"]) / box["width"], (here["y"] + 4.5 - box["y"]) / box["height"]]
+    asked = len([url for url in page.asked if "ask/map" in url and "place=0&" in url + "&"])
+    drag(page, page.locator("#map"), start, (start[0] + 0.03, start[1] - 0.05), steps=5)
+    page.wait_for_url("**roughness=**")
+    assert 0.31 < float(page.locator("#slope").input_value()) < 0.34
+    assert 0.61 < float(page.locator("#roughness").input_value()) < 0.66
+    slope = float(page.locator("#slope").input_value())
+    page.locator("#map").press("ArrowRight")
+    expect(page.locator("#slope")).to_have_value(f"{slope + 0.65 / 200:.4g}")
+    # One map serves every position of the cross-hair.
+    assert len([url for url in page.asked if "ask/map" in url and "place=0&" in url + "&"]) == asked
+    page.locator("#shade").select_option("density")
+    expect(page.locator("#map-key")).to_contain_text("Densities among the flows")
+    page.locator("#map-y").select_option("slope")
+    expect(page.locator("#map-x")).to_have_value("roughness")
+
+
+def test_each_flow_is_told_stable_or_not_when_the_sliders_rest(page):
+    opened(page)
+    expect(page.locator("#flows .stability").nth(0)).to_contain_text("unstable: waves across the slope", timeout=60_000)
+    page.locator("#surface").select_option("interface")
+    expect(page.locator("#flows .stability").nth(0)).to_contain_text("not known whether it is stable", timeout=60_000)
+
+
+def test_stability_that_is_superseded_is_taken_back(page):
+    opened(page)
+    ended = []
+    page.on("requestfailed", lambda request: ended.append(request.url))
+    with page.expect_request(lambda request: "ask/stability" in request.url and "Q=3.3" in request.url):
+        page.locator("#Q").fill("3.3")
+        page.locator("#Q").press("Enter")
+    page.locator("#Q").fill("3.4")
+    page.locator("#Q").press("Enter")
+    expect(page.locator("#says")).to_contain_text("Q = 3.4")
+    assert any("ask/stability" in url and "Q=3.3" in url for url in ended)
+
+
+def test_presets_are_cases_of_the_paper(page):
+    opened(page)
+    page.locator("#presets").select_option(label="Beneath an interface (figures 7 to 9)")
+    expect(page.locator("#surface")).to_have_value("interface")
+    expect(page.locator("#command")).to_contain_text("--surface interface ")
+    page.wait_for_url("**surface=interface**")
+
+
+def test_the_picture_of_the_chute_moves_unless_less_motion_is_asked_for(page):
+    opened(page)
+    picture = "document.querySelector('#chute').toDataURL()"
+    expect(page.locator("#chute-key")).to_contain_text("A drawing of the computed fields, not a simulation")
+    expect(page.locator("#pause")).to_have_text("play")
+    before = page.evaluate(picture)
+    page.wait_for_timeout(150)
+    assert page.evaluate(picture) == before
+    page.emulate_media(reduced_motion="no-preference")
+    expect(page.locator("#pause")).to_have_text("pause")
+    page.wait_for_timeout(150)
+    assert page.evaluate(picture) != before
+    page.locator("#pause").click()
+    expect(page.locator("#pause")).to_have_text("play")
+
+
+def test_colours_follow_the_system_or_the_choice(page):
+    ground = "getComputedStyle(document.body).backgroundColor"
+    page.emulate_media(color_scheme="dark")
+    opened(page)
+    dark = page.evaluate(ground)
+    page.locator("#theme").select_option("light")
+    assert page.evaluate(ground) == "rgb(255, 255, 255)" != dark
+    expect(page.locator("#curve .dot").nth(0)).to_have_attribute("fill", "#0061a8")
+    page.emulate_media(color_scheme="light")
+    page.locator("#theme").select_option("dark")
+    assert page.evaluate(ground) == dark
 
 
 def test_everything_can_be_reached_by_tab_and_has_a_name(page):
@@ -174,7 +287,20 @@ def test_everything_can_be_reached_by_tab_and_has_a_name(page):
     for _ in range(60):
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.id"))
-    assert {"presets", "slope", "slope-slider", "Q-slider", "curve", "copy-command", "map-over"} <= reached
+    controls = {f"{name}{part}" for name in ("slope", "e", "ew", "roughness", "Q") for part in ("", "-slider")}
+    others = {"presets", "si", "theme", "angle", "surface", "closure", "against", "whole", "curve", "pause", "map"}
+    assert controls | others | {"map-x", "map-y", "shade", "copy-address", "copy-command", "copy-python"} <= reached
+
+
+def test_every_slider_moves_by_the_keyboard_and_is_explained(page):
+    opened(page)
+    for name in ("slope", "e", "ew", "roughness", "Q"):
+        slider, before = page.locator(f"#{name}-slider"), page.locator(f"#{name}").input_value()
+        slider.press("ArrowRight")
+        assert float(page.locator(f"#{name}").input_value()) > float(before)
+        for control in (slider, page.locator(f"#{name}")):
+            described = control.get_attribute("aria-describedby")
+            assert page.locator(f"#{described}").inner_text().endswith(".")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -191,15 +317,37 @@ def test_contrast_of_text_and_colours(page, theme):
             probe.remove();
             return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
         };
-        const names = ['ink', 'quiet', 'accent', 'curve', 'flow0', 'flow1', 'flow2', 'flow3', 'flow4'], ratios = {};
+        const flows = ['flow0', 'flow1', 'flow2', 'flow3', 'flow4'];
+        const names = ['ink', 'quiet', 'accent', 'curve', 'warning', 'edge', ...flows];
+        const ratios = {};
         for (const name of names) for (const ground of ['paper', 'panel']) {
-            const pair = [level(name), level(ground)].sort();
+            const pair = [level(name), level(ground)].sort((a, b) => a - b);
             ratios[`${name} on ${ground}`] = (pair[1] + 0.05) / (pair[0] + 0.05);
         }
         return ratios;
     }"""
     )
-    assert min(ratios.values()) >= 4.5, ratios
+    # WCAG 2 AA: 4.5 for text and 3 for the edges of what one operates.
+    assert min(ratio for name, ratio in ratios.items() if not name.startswith("edge")) >= 4.5, ratios
+    assert min(ratios.values()) >= 3.0, ratios
+    # Every text is of one of those colours: nothing else is set.
+    used = page.evaluate(
+        """() => {
+        const text = (e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
+        const all = [...document.querySelectorAll('body *')].filter((e) => text(e) && e.checkVisibility());
+        return [...new Set(all.map((e) => getComputedStyle(e)[e instanceof SVGElement ? 'fill' : 'color']))];
+    }"""
+    )
+    known = page.evaluate(
+        """() => ['ink', 'quiet', 'accent'].map((name) => {
+        const probe = document.body.appendChild(document.createElement('i'));
+        probe.style.color = `var(--${name})`;
+        const c = getComputedStyle(probe).color;
+        probe.remove();
+        return c;
+    })"""
+    )
+    assert set(used) <= set(known)
 
 
 def test_it_fits_a_phone(page):
@@ -214,10 +362,11 @@ def test_latency_from_slider_to_redraw(page):
     drag(page, page.locator("#slope-slider"), (0.36, 0.5), (0.40, 0.5), steps=60)
     times = page.evaluate(
         """() => Object.fromEntries(['flows-redraw', 'curve-redraw'].map((name) =>
-        [name, performance.getEntriesByName(name).map((entry) => entry.duration).sort((a, b) => a - b)]))"""
+        [name, performance.getEntriesByName(name).map((entry) => entry.duration)]))"""
     )
-    middle = {name: durations[len(durations) // 2] for name, durations in times.items()}
     assert len(times["flows-redraw"]) > 10
-    # Six times the targets of 50 and 150 ms, since other tests run beside this one.
-    assert middle["flows-redraw"] < 300.0, middle
-    assert middle["curve-redraw"] < 900.0, middle
+    middle = {name: median(durations) for name, durations in times.items()}
+    # Targets are 50 and 150 ms on a machine at rest. Here other tests run beside this one: so much slower is a page
+    # on which dragging no longer works, whatever else goes on.
+    assert middle["flows-redraw"] < 10 * 50.0, middle
+    assert middle["curve-redraw"] < 10 * 150.0, middle

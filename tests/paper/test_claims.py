@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from chuteflow.paper.claims.registry import Finding, claim, close, decide, round
 from chuteflow.paper.claims.shared import count, curve_of, named_flows
 from chuteflow.paper.materials import dissipative
 from chuteflow.steady.flow import Flow
+from chuteflow.theory.hot import HotSolution
 
 CORRECTED = {
     "all-inverted-on-steep-slopes",
@@ -76,6 +78,10 @@ NUMBERS = {
     ("minimum-slope", None): 0.1729,
     ("no-three-flows-on-steep-slopes", None): 0.3533,
     ("less-elastic-grains", "largest g40/g30"): 0.46187,
+    ("hot-is-dilute", "largest nu at T_inf = 100000"): 3.1626e-6,
+    ("slip-velocity", "A"): 1.47670,
+    ("finite-range-of-slopes", "from tan(theta)"): 0.18,
+    ("finite-range-of-slopes", "to tan(theta)"): 0.4,
 }
 
 
@@ -158,7 +164,7 @@ def test_number(verdicts, place, expected):
 
 
 def test_verdicts_cannot_be_changed():
-    found = CLAIMS["flow-a"].check()
+    found: Any = CLAIMS["flow-a"].check()
     with pytest.raises(FrozenInstanceError):
         found.verdict = "corrected"
 
@@ -220,6 +226,13 @@ WRONG = {
     "base-traction": (model, "_traction_factor", lambda big_a: 0.5),
     "only-cold-inverted": (three_flows, "named_flows", lambda: dict.fromkeys("ABC", named_flows()["A"])),
     "shooting-constant": (hot_flows, "hot_solution", lambda v: domains.hot_solution(1.001)),
+    "local-series": (HotSolution, "c", property(lambda solution: 4.6)),
+    "slip-velocity": (model, "_traction_factor", lambda big_a: 0.5),
+    "finite-range-of-slopes": (flow_curves, "cold_slope_bounds", lambda chute: (0.16, 0.36)),
+    "interface-converges": (interface, "named_flows", lambda surface: {"C": named_flows()["C"]}),
+    "hot-is-dilute": (Flow, "largest_volume_fraction", scaled("largest_volume_fraction", 1.01)),
+    "lambda-diverges": (hot_flows, "_model", lambda chute: hot_flows.hot(replace(chute, slope=1.01 * chute.slope))),
+    "lambda-zero-agrees": (domains, "slope_at", lambda *values: 1.015 * (hot_flows.slope_at(*values) or 0.0)),
 }
 
 

@@ -212,7 +212,7 @@ def _start(model: Model, temperature: Array) -> tuple[Array, Array, Array]:
 
 
 def _series(model: Model, temperature: Array, p: Array) -> tuple[Array, Array, Array]:
-    """p, L and y by the series at the surface of the half-line (3.23)-(3.25)."""
+    """p, L and y by the series at the surface of the half-line (3.23)-(3.25), which solves (3.20)-(3.22)."""
     f0, _ = model.closures(np.zeros(1))
     half = 0.5 * (f0[LOSS, 0] - model.slope**2 * f0[WORK, 0])
     theta = np.log(temperature) + 0.5 * p**2 * half / f0[CONDUCTION, 0]

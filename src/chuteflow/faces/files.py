@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from chuteflow.errors import InputError
 from chuteflow.faces.records import KIND_OF, Result
 from chuteflow.faces.writing import require_suffix, require_writable, written_beside
 from chuteflow.steady.quantities import Scales
+
+if TYPE_CHECKING:
+    from chuteflow.analysis.domains import Domain
 
 #: The module of each format, imported when it is needed; each has write(result, path, scales) and read(path).
 FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
@@ -17,8 +21,8 @@ FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)
 
 
-def save(result: Result, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
-    """Write a flow, a set of flows or a curve to ``path``: .nc (NetCDF 4, CF conventions), .csv or .json.
+def save(result: Result | Domain, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
+    """Write a flow, a set of flows, a curve or a domain to ``path``: .nc (NetCDF 4, CF conventions), .csv or .json.
 
     The file holds every number of the registry; .nc and, but for curves, .csv also the profiles of all fields
     up to the depth. Numbers are dimensionless, or in SI units where ``scales`` are given. :func:`load` gives
@@ -27,22 +31,40 @@ def save(result: Result, path: str | os.PathLike[str], *, scales: Scales | None 
     Raises:
         InputError: for a result or an ending that is not known, or a file that cannot be written.
     """
+    from chuteflow.analysis.domains import Domain
+
+    if isinstance(result, Domain):
+        _save_domain(result, path, scales)
+        return
     if type(result) not in KIND_OF:
-        raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows or a curve")
+        raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows, a curve or a domain")
     writer = import_module(f"chuteflow.faces.{FORMATS[require_writable(path, tuple(FORMATS))]}")
     with written_beside(path) as partial:
         writer.write(result, partial, scales)
 
 
-def load(path: str | os.PathLike[str]) -> Result:
-    """The flow, set of flows or curve that :func:`save` wrote to ``path``; its numbers are dimensionless.
+def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | None) -> None:
+    from chuteflow.faces import domain_records
+
+    if scales is not None:
+        raise InputError("a domain has no units: save it without scales")
+    require_writable(path, tuple(FORMATS))
+    with written_beside(path) as partial:
+        domain_records.write(found, partial)
+
+
+def load(path: str | os.PathLike[str]) -> Result | Domain:
+    """The flow, set of flows, curve or domain that :func:`save` wrote to ``path``; its numbers are dimensionless.
 
     Raises:
         InputError: for a file that is missing, damaged, of another program or of a later version.
     """
+    from chuteflow.faces import domain_records
+
     reader = import_module(f"chuteflow.faces.{FORMATS[require_suffix(path, tuple(FORMATS))]}")
     try:
-        return reader.read(Path(path))
+        found = domain_records.read(Path(path))
+        return reader.read(Path(path)) if found is None else found
     except InputError as error:
         raise InputError(f"cannot load {path}: {error}") from None
     except OSError as error:

@@ -96,14 +96,17 @@ condition_options = _options(
     option("--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
     option("--temperature", metavar="AMOUNT", help="Granular temperature far above, or at the interface."),
 )
-search_options = _options(
-    option("--tolerance", type=Number(), help="Relative error allowed in Q, h and M; 1e-10 by default."),
+search_range_options = _options(
     option(
         "--search-temperature",
         type=Interval(),
         help="Surface temperatures searched; 0.001:100000 by default.",
     ),
     option("--largest-holdup", type=Number(), help="Largest mass hold-up searched; 30 by default."),
+)
+search_options = _options(
+    option("--tolerance", type=Number(), help="Relative error allowed in Q, h and M; 1e-10 by default."),
+    search_range_options,
 )
 output_options = _options(
     click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),

@@ -64,7 +64,7 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
         style.name_axes(ax, style.label(field, scales), style.label("height", scales) if ax is axes[0] else None)
         ax.set_xlim(left=0.0)
         ax.set_ylim(0.0, top * factor("height", chute, scales))
-    style.caption(figure, _parameters(chute))
+    style.caption(figure, parameters(chute))
     style.legend(figure, handles=axes[0].get_lines(), loc="outside lower center")
     return figure
 
@@ -88,7 +88,7 @@ def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
         for axis, name in zip("xy", pair, strict=True):
             style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
         style.name_axes(ax, *(style.label(name, scales) for name in pair))
-    style.caption(figure, _parameters(curve.chute))
+    style.caption(figure, parameters(curve.chute))
     style.legend(figure, handles=list(_key(curve)), loc="outside lower center", ncols=4)
     return figure
 
@@ -108,11 +108,12 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
 
 def _none(chute: Chute, reason: str | None) -> Figure:
     figure = style.sentence(f"No flow: {reason}.")
-    style.caption(figure, _parameters(chute))
+    style.caption(figure, parameters(chute))
     return figure
 
 
-def _parameters(chute: Chute) -> str:
+def parameters(chute: Chute) -> str:
+    """All parameters of ``chute``, for a caption."""
     surface = {"free": "free surface", "interface": "interface"}[chute.surface]
     return (
         rf"$\tan\theta = {chute.slope:g}$, $e = {chute.restitution:g}$, $e_w = {chute.wall_restitution:g}$, "

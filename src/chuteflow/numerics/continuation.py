@@ -54,7 +54,7 @@ class System(Protocol):
         """The w_i >= 0 of <a, b> = sum_i w_i a_i b_i, (n+1,); at least one must be positive."""
         ...
 
-    def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
+    def residual_and_jacobian(self, z: Array, /) -> tuple[Array, Array]:
         """F (n,) and its exact Jacobian (n, n+1) at ``z`` (n+1,); not finite where z is out of the domain."""
         ...
 
@@ -63,7 +63,7 @@ class System(Protocol):
 class AdaptiveSystem(System, Protocol):
     """A system that may ask for another discretisation between two steps."""
 
-    def adapted(self, z: Array, tangent: Array) -> tuple[Self, Array, Array] | None:
+    def adapted(self, z: Array, tangent: Array, /) -> tuple[Self, Array, Array] | None:
         """Another system with the point and its tangent carried over, or None to go on as before.
 
         The point and the tangent need to satisfy the new system only roughly: they are corrected first.

@@ -82,7 +82,7 @@ def apply(function: Callable[[Field], Field], number: Any) -> list[Any]:
     if not isinstance(number, FirstOrder):
         return list(function(number))
     values = function(number.value)
-    slopes = function(number.value + 1j * _STEP).imag / _STEP
+    slopes = np.imag(function(number.value + 1j * _STEP)) / _STEP
     return [FirstOrder(v, s[..., None] * number.slope) for v, s in zip(values, slopes, strict=True)]
 
 

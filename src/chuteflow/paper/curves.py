@@ -104,7 +104,7 @@ def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, t
     places = sorted((hot_end(found.curves[name].branches[0], top), name) for name in names)
     labels: list[float] = []
     for place, name in places:
-        labels.append(max(place, labels[-1] + 0.034 * right) if labels else place)
+        labels.append(max(place, labels[-1] + 0.043 * right) if labels else place)
         style.write(
             ax, labels[-1], top, f"{name:.2f}", xytext=(1.0, 2.0), rotation=60, rotation_mode="anchor", ha="left"
         )

@@ -37,9 +37,11 @@ class Unreached:
 
 @dataclass(frozen=True, eq=False)
 class MappedCurves:
-    """The families of a chute as far as the mapped method reaches, and those that it does not."""
+    """The families of a chute in a range of surface temperatures as far as the mapped method reaches, and those that
+    it does not."""
 
     chute: Chute
+    surface_temperature: tuple[float, float]
     branches: tuple[MappedCurve, ...]
     unreached: tuple[Unreached, ...]
 
@@ -165,7 +167,7 @@ def mapped_families(chute: Chute, surface_temperature: tuple[float, float]) -> M
         else:
             ends = float(branch.surface_temperature.min()), float(branch.surface_temperature.max())
             unreached.append(Unreached(ends, f"the series do not converge with up to N = {LARGEST_DEGREE}"))
-    return MappedCurves(chute, tuple(reached), tuple(unreached))
+    return MappedCurves(chute, surface_temperature, tuple(reached), tuple(unreached))
 
 
 def _shared_out(workers: int, chutes: Sequence[Chute], ranges: Sequence[tuple[float, float]]) -> Sequence[MappedCurves]:
@@ -187,13 +189,25 @@ def _die_quietly() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+#: How notes begin on flows that a method does not reach.
+NOT_REACHED = "not reached"
+
+
 def reach(found: SteadyCurve) -> list[str]:
     """How far the flows of a chute are known, in lines for the data."""
     if isinstance(found, Curve):
         return ["all flows with surface temperatures from {} to {}".format(*found.searched.surface_temperature)]
-    return [
-        "not reached: a family with surface temperatures from {:g} to {:g}: {}".format(
-            *lost.surface_temperature, lost.reason
-        )
-        for lost in found.unreached
+    low, high = found.surface_temperature
+    cut = [
+        f"{NOT_REACHED}: what lies beyond the surface temperature {temperature:g} on a family: {end}"
+        for branch in found.branches
+        for temperature, end in zip(branch.surface_temperature[[0, -1]], branch.ends, strict=True)
+        if low < temperature < high
     ]
+    lost = [
+        "{}: a family with surface temperatures from {:g} to {:g}: {}".format(
+            NOT_REACHED, *family.surface_temperature, family.reason
+        )
+        for family in found.unreached
+    ]
+    return cut + lost

@@ -128,7 +128,7 @@ def operator(base: Base) -> Operator:
     """
     parts, weights = zip(*(_linearised(base, kx, ky) for kx, ky in _SAMPLES), strict=True)
     fit = np.linalg.inv(_monomials(*_SAMPLES.T).T)
-    powers = np.tensordot(np.round(fit, 12), np.array(parts), axes=1)
+    powers: Complex = np.tensordot(np.round(fit, 12).astype(complex), np.array(parts), axes=1)
     at_rest = steady_motion(base)
     flux = base.profile.granular_temperature[0] * _conductivity(base)
     return Operator(base, powers, weights[0], (_viscosity(base, at_rest), flux))

@@ -5,6 +5,9 @@ An eigenvalue of the coarse grid is a mode if
 - its density is resolved: the last coefficients of its Chebyshev series are small;
 - it comes back on a finer grid, with another map that reaches farther: the change is its error;
 - that change is a small part of its distance to the continuous spectrum.
+
+The continuous spectrum never grows. A mode that runs into it is no longer reported. An eigenvalue that grows on
+the coarse grid is followed to the finest, until it is a mode, or is gone, or keeps changing from grid to grid.
 """
 
 from __future__ import annotations
@@ -15,26 +18,32 @@ from functools import cached_property
 import numpy as np
 
 from chuteflow.errors import InputError, SolveError
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
-from chuteflow.stability.base import Base, Resolution, base
+from chuteflow.stability.base import Base, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
 
-#: Degrees of the coarse and fine grids, tried in turn, and the weights of their maps.
+#: Degrees of the coarse and fine grids, tried in turn, and the weights of their maps for each unit of
+#: ln(1 + M/T) + k T: what is dense or short in z needs points near the base.
 DEGREES = ((32, 44), (48, 64), (72, 96))
-_BETAS = (0.0, 1.0)
-#: How far the grids reach, in ln p, for wavenumbers down to _LONG, and how much farther the fine one does.
-_REACH, _FARTHER, _LONG = 14.0, 2.0, 1e-3
+_WEIGHTS, _LARGEST_WEIGHT = (0.5, 0.8), 16.0
+#: How far the grids reach, in ln p, for k h >= _SHORT M, and more for longer waves.
+_REACH, _SHORT = ((10.5, 13.0), (12.0, 14.5), (13.5, 16.5)), 1.0 / 60.0
+#: Steps in which the reach grows, so that wavenumbers share grids.
+_STRIDE = 1.5
 #: Largest share of the last coefficients of a resolved density.
 _TAIL = 0.03
-#: Largest share that the change between grids may have in the distance to the continuous spectrum.
-_DRIFT = 1e-3
-#: Absolute error of a growth rate that is asked for, unless told otherwise.
+#: Largest share that the change between grids may have in the distance to the continuous spectrum; what moves by
+#: more than the second on the finest grids is an artefact of them.
+_DRIFT, _ARTEFACT = 1e-3, 0.03
+#: Error of a rate that is asked for unless told otherwise; relative for rates above 1.
 TOLERANCE = 1e-6
-#: Largest wavenumber, in 1/d: shorter waves than a tenth of a grain have no meaning.
-_LARGEST = 60.0
+#: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
+NEUTRAL, AT_REST = 1e-6, 1e-10
+#: Smallest and largest wavenumber that is not 0, in 1/d.
+_SMALLEST, _LARGEST = 1e-15, 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +77,11 @@ class Mode:
         return self.frequency / self.kx if self.kx else None
 
     @property
+    def kind(self) -> str:
+        """ "mass" for the neutral mode that leads to the neighbouring steady flow, else :attr:`direction`."""
+        return "mass" if self.direction == "uniform" and abs(self.sigma) < AT_REST else self.direction
+
+    @property
     def direction(self) -> str:
         """ "uniform", "along" the slope, "across" it or "oblique", by the wavenumbers."""
         if self.kx == 0.0 and self.ky == 0.0:
@@ -92,6 +106,14 @@ class Mode:
         velocity = out[ALONG:-1]
         return out / velocity.ravel()[np.abs(velocity).argmax()]
 
+    def sampled(self, points: int = 201) -> tuple[Array, Complex]:
+        """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
+        base_ = self.operator.base
+        s = grid(points - 1).nodes[::-1]
+        share, _ = shares(s, base_.resolution)
+        matrix = interpolation_matrix(base_.grid, s)
+        return self.flow.at_overburden(share).height, self.fields @ matrix.T
+
 
 def relative_fields(of: Operator, vector: Complex) -> Complex:
     """n = nu'/nu, u, v, w and tau = T'/T at the nodes, (5, n), from the unknowns."""
@@ -115,8 +137,8 @@ class Disturbances:
     def modes(self, kx: float, ky: float, *, count: int = 1, tolerance: float = TOLERANCE) -> list[Mode]:
         """Up to ``count`` modes at wavenumbers ``kx`` along and ``ky`` across the slope, fastest growing first.
 
-        Grids are refined until the first of them is known to ``tolerance``. Where the continuous spectrum
-        hides all modes, there are none.
+        Grids are refined until the first of them is known to ``tolerance``, and nothing else grows. Where the
+        continuous spectrum hides all modes, there are none.
 
         Raises:
             InputError: for wavenumbers out of range.
@@ -125,43 +147,78 @@ class Disturbances:
         check_wavenumbers(kx, ky)
         error = np.inf
         for level in range(len(DEGREES)):
-            found = self._accepted(kx, ky, level, count)
-            if found and (error := found[0].error) <= tolerance:
+            found, doubtful = self.accepted(kx, ky, level, count)
+            if not doubtful and found and (error := found[0].error) <= tolerance * max(1.0, abs(found[0].sigma)):
                 return found
-            if not found and level:
+            if not doubtful and not found and level:
                 return []
         raise SolveError(
             f"the leading mode at kx = {kx:g}, ky = {ky:g} is known to {error:.1e} at best, not to {tolerance:g}: "
             "ask for a larger tolerance"
         )
 
+    def accepted(self, kx: float, ky: float, level: int, count: int = 1) -> tuple[list[Mode], bool]:
+        """Up to ``count`` modes on the grids of a ``level``, and whether something that is none of them seems to grow.
+
+        The wavenumbers are not checked.
+        """
+        found: list[Mode] = []
+        finest = level == len(DEGREES) - 1
+        for candidate in self.candidates(kx, ky, level):
+            mode, drift = self._compared(kx, ky, complex(candidate), level)
+            if mode is not None:
+                found.append(mode)
+            elif candidate.real > self.smallest_rate and not found and (not finest or drift < _ARTEFACT):
+                return [], True
+            if len(found) == count:
+                break
+        return found, False
+
+    @property
+    def smallest_rate(self) -> float:
+        """Growth that counts as none: 1e-6 sqrt(g cos(theta)/h)."""
+        return NEUTRAL / float(np.sqrt(self.flow.centre_of_mass))
+
     def candidates(self, kx: float, ky: float, level: int = 0) -> Complex:
         """Eigenvalues of the coarse grid that may be modes, fastest growing first; not yet checked on another."""
-        resolution = self._resolutions(kx, ky, level)[0]
-        of = self.operator(resolution)
-        curve = self._curve(resolution, kx)
+        of = self.coarse_operator(kx, ky, level)
+        curve = self._curve(of.base.resolution, kx)
         end = curve[0]
         # To the right of everything that matters, in the middle of the range of speeds.
         shift = complex(0.05 * (1.0 + abs(kx)), 0.5 * (end.imag + curve[-1].imag))
         found = spectrum(of.matrix(kx, ky), of.weights, shift)
         kept = (density_tail(of, found.vectors) < _TAIL) & (np.abs(found.values - end) > 3.0 * abs(end.real))
+        kept |= found.values.real > self.smallest_rate
         if kx == 0.0 and ky == 0.0:
-            kept |= np.abs(found.values) < 1e-10
+            kept |= np.abs(found.values) < AT_REST
         values = found.values[kept]
         return values[np.argsort(-values.real)]
 
     def checked(self, kx: float, ky: float, candidate: complex, level: int = 0) -> Mode | None:
         """The mode on the fine grid that ``candidate`` of the coarse one stands for, or None if there is none."""
+        return self._compared(kx, ky, candidate, level)[0]
+
+    def _compared(self, kx: float, ky: float, candidate: complex, level: int) -> tuple[Mode | None, float]:
+        """The same, and the change between the grids in shares of the distance to the continuous spectrum."""
         coarse, fine = self._resolutions(kx, ky, level)
         of = self.operator(fine)
         sigma, vector = refined(of.matrix(kx, ky), of.weights, candidate)
         error = abs(sigma - candidate)
-        away = distance(np.array([sigma]), self._curve(coarse, kx))[0]
+        away = max(float(distance(np.array([sigma]), self._curve(coarse, kx))[0]), 1e-300)
         if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
-            return None
+            return None, error / away
         # Rounding leaves this much of a rate, whatever the grids say.
         noise = 1e-14 * (1.0 + abs(sigma))
-        return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector)
+        return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector), error / away
+
+    def followed(self, kx: float, ky: float, near: complex, level: int = 0) -> Mode | None:
+        """The mode whose rate is closest to ``near``, its value at wavenumbers close by: much faster than a search."""
+        of = self.coarse_operator(kx, ky, level)
+        return self.checked(kx, ky, refined(of.matrix(kx, ky), of.weights, near)[0], level)
+
+    def coarse_operator(self, kx: float, ky: float, level: int = 0) -> Operator:
+        """The operator on the coarse grid for these wavenumbers."""
+        return self.operator(self._resolutions(kx, ky, level)[0])
 
     def operator(self, resolution: Resolution) -> Operator:
         """The operator on one grid."""
@@ -173,25 +230,17 @@ class Disturbances:
         """Points of the continuous spectrum, from far above down to the base."""
         return self._curve(self._resolutions(kx, 0.0, 0)[0], kx)
 
-    def _accepted(self, kx: float, ky: float, level: int, count: int) -> list[Mode]:
-        found: list[Mode] = []
-        for candidate in self.candidates(kx, ky, level):
-            mode = self.checked(kx, ky, complex(candidate), level)
-            if mode is not None:
-                found.append(mode)
-            if len(found) == count:
-                break
-        return found
-
     def _resolutions(self, kx: float, ky: float, level: int) -> tuple[Resolution, Resolution]:
         # Far above, where nu is below k, stresses change from those of inertia to those of viscosity.
-        k = float(np.hypot(kx, ky))
-        decades = np.ceil(np.log10(_LONG / k)) if 0.0 < k < _LONG else 0.0
-        farther = float(np.log(10.0) * decades)
-        degrees = (round(degree * (1.0 + farther / _REACH)) for degree in DEGREES[level])
+        k, warmth, mass = float(np.hypot(kx, ky)), self.flow.surface_temperature, self.flow.mass_holdup
+        beyond = np.log(max(1.0, _SHORT * mass / (k * self.flow.centre_of_mass))) if k else 0.0
+        farther = _STRIDE * float(np.ceil(beyond / _STRIDE))
+        # In powers of 2, so that wavenumbers share grids.
+        decay = min(2.0 ** float(np.round(np.log2(k * warmth))), _LARGEST_WEIGHT) if k * warmth > 0.7 else 0.0
+        stretch = float(np.log1p(mass / warmth)) + decay
         coarse, fine = (
-            Resolution(degree, _REACH + farther + more, beta)
-            for degree, more, beta in zip(degrees, (0.0, _FARTHER), _BETAS, strict=True)
+            Resolution(round(degree * (1.0 + 0.5 * farther / reach)), reach + farther, weight * stretch)
+            for degree, reach, weight in zip(DEGREES[level], _REACH[level], _WEIGHTS, strict=True)
         )
         return coarse, fine
 
@@ -222,5 +271,5 @@ def check_wavenumbers(kx: float, ky: float) -> None:
         if not (np.isfinite(k) and abs(k) <= _LARGEST):
             raise InputError(f"wavenumber {name} = {k}: must be from -{_LARGEST:g} to {_LARGEST:g} (in 1/d)")
     k = np.hypot(kx, ky)
-    if 0.0 < k < 1e-9:
-        raise InputError(f"wavenumber {k:g}: must be 0 or at least 1e-9 (in 1/d)")
+    if 0.0 < k < _SMALLEST:
+        raise InputError(f"wavenumber {k:g}: must be 0 or at least {_SMALLEST:g} (in 1/d)")

@@ -111,7 +111,7 @@ class State:
         self.dtype = np.result_type(self.y, self.base_flux)
 
     def residual(self) -> Array:
-        """Surface condition, energy balance at the nodes below it, base condition, (n+2,)."""
+        """Surface condition, energy balance (3.9) at the nodes below it, base condition (3.17), (n+2,)."""
         model = self.problem.model
         r = np.empty((*self.p.shape[:-1], self.p.shape[-1] + 1), dtype=self.dtype)
         r[..., :-1] = self.p * (self.y_p - self.net_loss) + self.y * (1.0 + 0.5 * self.heating)

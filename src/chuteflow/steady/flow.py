@@ -25,7 +25,11 @@ _SMALLEST_SHARE = 1e-260
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS."""
+    """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS.
+
+    The normal stress is the weight of the grains above (3.2), (3.4), and the shear stress tan(theta) times that
+    (3.1), (3.5); the heat flux has the two parts of (3.6), and the dissipation is (3.7).
+    """
 
     height: Array
     volume_fraction: Array

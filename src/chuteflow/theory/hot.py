@@ -5,6 +5,9 @@
 # P = psi tau = p/alpha overburden, P_b at the base, Y = sqrt(tau), k = sqrt(3 |lambda|), x = |P_b|/k,
 # C_n = I_n for lambda > 0 and J_n for lambda < 0, B = sqrt(|lambda|/3).
 
+With s for coordinate (4.5) and nu = alpha psi/T_inf (4.10), the leading order (4.6)-(4.8) of the full equations is
+(4.11)-(4.13), and that of the velocity (4.15) is (4.16), (4.17).
+
 The paper solves (4.11)-(4.13) by shooting, but there is an exact solution. By (4.11) s d/ds = psi d/dP, and
 with P for coordinate (4.12) is linear in Y,
 

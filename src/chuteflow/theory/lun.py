@@ -15,10 +15,16 @@ _ROOT_PI = float(np.sqrt(np.pi))
 
 
 def lun(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
-    """Table 1, with x = nu g0 and every 0/0 at nu = 0 divided out. ``slope`` does not enter."""
+    """Table 1 as the paper has it. ``slope`` does not enter."""
     del slope
-    g0 = room ** (-2.5 * DENSEST)
-    log_slope = 2.5 / room  # g0'/g0
+    return table_1(nu, room ** (-2.5 * DENSEST), 2.5 / room, e)
+
+
+def table_1(nu: Field, g0: Field, log_slope: Field, e: float) -> Coefficients:
+    """Table 1 for any radial distribution function ``g0``, with ``log_slope`` = g0'/g0.
+
+    In terms of x = nu g0, with every 0/0 at nu = 0 divided out.
+    """
     x = nu * g0
     x_slope = g0 * (1.0 + nu * log_slope)
     f = 1.0 + e
@@ -46,7 +52,7 @@ def lun(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
 
 
 def lun_fourier(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
-    """Table 1 with g4 = 0 (the paper's appendix)."""
+    """Table 1 with g4 = 0 (the paper's appendix), for which T comes to T_inf as in (A2), and not as in (A1)."""
     full = lun(nu, room, e, slope)
     return replace(full, density_conductivity=np.zeros_like(full.density_conductivity))
 

@@ -175,21 +175,23 @@ def boundary(
 
     def follow(points: Iterator[BoundaryPoint], share: float) -> None:
         for point in points:
-            if not any(other.holds(point, tolerance) for other in found):
+            inside = within.contains(point.flow.solution.macroscopic)
+            if inside and not any(other.holds(point, tolerance) for other in found):
                 notice = partial(progress, "following", share)
                 found.append(traced(point, within, tolerance, control, notice))
 
     values = np.linspace(sweep.low, sweep.high, samples).tolist()
+    spacing = (sweep.high - sweep.low) / (samples - 1)
     for i, value in enumerate(values):
         share = i / samples
         progress("searching", share)
-        families, value = _families(sweep, value, (sweep.high - sweep.low) / (samples - 1), within)
+        families, value = _families(sweep, value, spacing, within)
         if families is None:
             skipped.append(value)
             continue
         sampled.append(value)
         for condition in seeds.conditions(of):
-            follow(seeds.on_families(sweep, condition, value, families, tolerance), share)
+            follow(seeds.on_families(sweep, condition, value, families, spacing, tolerance), share)
     for condition in seeds.conditions(of):
         for low, high in pairwise(values):
             for value in seeds.whatever_the_flow(sweep, condition, low, high):

@@ -20,7 +20,7 @@ there for every m: such points are regular points of the curve G = 0.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Protocol, Self, cast
 
 import numpy as np
 
@@ -100,7 +100,7 @@ class Fold:
         """See :class:`Condition`."""
         g, v, w = self._solved(at)
         which = self.which
-        aside = at.state.problem.state(at.z + 1j * IMAGINARY_STEP * v)
+        aside = along(at, v)
         by_z = w @ _bordered(aside.jacobian(), aside.macroscopic_gradient()[which])
         by_parameter = w @ _bordered(at.stepped.jacobian(), at.stepped.macroscopic_gradient()[which]) @ v
         return g, -by_z.imag / IMAGINARY_STEP, -float(by_parameter.imag) / IMAGINARY_STEP
@@ -128,9 +128,10 @@ class Fold:
         matrix = np.zeros((n + 1, n + 1))
         matrix[:n, :n] = _bordered(at.by_z, at.state.macroscopic_gradient()[self.which])
         matrix[:n, n], matrix[n, :n] = self.left, self.right
-        side = np.zeros(n + 1)
+        side, solved = np.zeros(n + 1), np.empty((2, n + 1))
         side[n] = 1.0
-        right, left = np.linalg.solve(matrix, side), np.linalg.solve(matrix.T, side)
+        solved[0], solved[1] = np.linalg.solve(matrix, side), np.linalg.solve(matrix.T, side)
+        right, left = solved
         return float(right[n]), right[:n], left[:n]
 
 
@@ -196,6 +197,12 @@ class InteriorChange(_OfFields):
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
         by_z = np.concatenate([-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.laden]])
         return float(row @ state.net_loss), by_z, float(row @ at.stepped.net_loss.imag) / IMAGINARY_STEP
+
+
+def along(at: Local, direction: Array) -> State:
+    """The state an imaginary step along a direction (n+3,) of the unknowns: its imaginary parts, over
+    IMAGINARY_STEP, are derivatives along it."""
+    return at.state.problem.state(cast("Array", at.z + 1j * IMAGINARY_STEP * direction))
 
 
 def _bordered(jacobian: Array, gradient: Array) -> Array:

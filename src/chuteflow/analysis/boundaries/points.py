@@ -18,8 +18,8 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.solver import DEGREES, Solution, Status, prolong
 
-#: Newton's method on a grid ends with a step below this.
-_STEP = 1e-8
+#: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
+_STEP = 1e-7
 #: Least error ever claimed, and error of the equations by rounding and tabulation of the closures.
 _FLOOR, _NOISE = 1e-12, 1e-13
 
@@ -63,6 +63,13 @@ def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance
         if change < max(tolerance, noise):
             return as_point(system, w, max(change, noise))
     raise SolveError("the finest grid did not reach the tolerance: ask for a larger tolerance")
+
+
+def shift(system: BoundarySystem, w: Array, row: Array) -> float:
+    """How far the parameter is from the boundary, by the first step of Newton's method in the plane across ``row``
+    (3,) through ``w``."""
+    residual, jacobian = _bordered(system, w, row, float(row @ w[-3:]))
+    return -float(np.linalg.solve(jacobian, residual)[-1])
 
 
 def through(system: BoundarySystem, w: Array, tolerance: float) -> BoundaryPoint:

@@ -2,19 +2,23 @@
 
 # notation: sigma runs from 0 to 1 along the chord between two successive flows of a family in the plane
 # (ln M, ln T_surface).
+
+A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
+either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
+from the ends of families, the parameter is moved until the condition holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from chuteflow.analysis.boundaries.conditions import Condition, Fold, InteriorChange, Inversion, Local
-from chuteflow.analysis.boundaries.points import BoundaryPoint, solved, through
+from chuteflow.analysis.boundaries.points import BoundaryPoint, shift, solved, through
 from chuteflow.analysis.boundaries.system import BoundarySystem, Sweep
 from chuteflow.analysis.crossings import Chord
 from chuteflow.analysis.families import traced_families
@@ -24,7 +28,8 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
-from chuteflow.steady.solver import Solution
+from chuteflow.steady.solver import Condition as SolverCondition
+from chuteflow.steady.solver import Solution, resolve
 
 #: The kinds of boundaries, and the quantities whose folds they are.
 FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
@@ -33,8 +38,15 @@ KINDS = (*FOLDS, "density-inversion", "interior-change")
 HELD = np.array([0.0, 0.0, 1.0])
 #: A point is looked for this far beyond a chord, and found within so many of its lengths beside it.
 _BEYOND, _BESIDE = 0.02, 1.0
+#: A quantity that changes by less of the way along a family is uniform.
+_FLAT = 1e-7
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
+#: A boundary beside the families is looked for as far as so many times the distance to go to it.
+_FARTHER = 1.5
+#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a share is left.
+_STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
 #: Net loss below this is none.
@@ -70,9 +82,15 @@ def conditions(kind: str) -> Sequence[Condition]:
 
 
 def on_families(
-    sweep: Sweep, condition: Condition, value: float, families: Sequence[TracedFamily], tolerance: float
+    sweep: Sweep,
+    condition: Condition,
+    value: float,
+    families: Sequence[TracedFamily],
+    reach: float,
+    tolerance: float,
 ) -> Iterator[BoundaryPoint]:
-    """Every point of the boundary on families of flows at one value of the parameter."""
+    """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
+    far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
     for family in families:
         samples = [_sample(sweep, condition, value, solution) for solution in family.solutions]
         found: list[BoundaryPoint] = []
@@ -81,6 +99,10 @@ def on_families(
                 if not any(_same(point, other) for other in found):
                     found.append(point)
         yield from found
+        for i, chord in _nearest(samples, condition):
+            point = _beside(sweep, condition, value, samples[i].solution, chord, reach, tolerance)
+            if point is not None:
+                yield point
 
 
 def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
@@ -103,7 +125,9 @@ def _between(
         return
     found = [p for p in (_near(sweep, condition, value, first, last, s, tolerance) for s in places) if p is not None]
     found = [p for i, p in enumerate(found) if not any(_same(p, q) for q in found[:i])]
-    if (len(found) % 2 == 1) == needed and len(found) == len(places):
+    if condition.turns and min(map(abs, slopes)) < _FLAT * float(np.hypot(*chord)):
+        yield from found  # the quantity is uniform there to rounding, which tells nothing of a turn
+    elif (len(found) % 2 == 1) == needed and len(found) == len(places):
         yield from found
     elif halvings:
         middle = _sample(sweep, condition, value, Chord(first.solution, last.solution).at(0.5))
@@ -144,6 +168,60 @@ def _near(
     beside = float(np.hypot(*(here - ends[0] - along / length * chord)))
     inside = -_BEYOND * length <= along <= (1.0 + _BEYOND) * length
     return point if inside and beside <= _BESIDE * length else None
+
+
+def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple[int, Array]]:
+    """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
+    plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
+    chords = np.diff(plane, axis=0)
+    if len(samples) < 3 or not chords.any(axis=1).all():
+        return
+    chords = np.concatenate([chords, chords[-1:]])
+    if condition.turns:
+        f = np.array([s.slope(c) / np.hypot(*c) for s, c in zip(samples, chords, strict=True)])
+    else:
+        f = np.array([sample.value for sample in samples])
+    size = np.abs(f)
+    for i in range(len(f)):
+        beside = [j for j in (i - 1, i + 1) if 0 <= j < len(f)]
+        if all(size[i] <= size[j] and f[i] * f[j] > 0.0 for j in beside):
+            yield i, chords[i]
+
+
+def _beside(
+    sweep: Sweep,
+    condition: Condition,
+    value: float,
+    solution: Solution,
+    chord: Array,
+    reach: float,
+    tolerance: float,
+) -> BoundaryPoint | None:
+    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
+    row = np.array([chord[1], chord[0], 0.0])
+    plane = SolverCondition.plane(chord, solution.macroscopic)
+    at = value
+    for _ in range(_WALK):
+        w = np.append(solution.z, at)
+        system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+        ahead = at + shift(system, w, row)
+        if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
+            return None
+        if abs(ahead - at) <= _ARRIVED * reach:
+            break
+        at += float(np.clip(ahead - at, -_STRIDE * reach, _STRIDE * reach))
+        moved = replace(solution.problem, model=sweep.models(at)[0])
+        solution = resolve(replace(solution, problem=moved), plane, _ROUGH)
+        if not solution.converged:
+            return None
+    else:
+        return None
+    try:
+        point = solved(system, w, row, float(row @ w[-3:]), tolerance)
+    except SolveError:
+        return None
+    near = abs(point.value - value) <= _FARTHER * reach and sweep.low <= point.value <= sweep.high
+    return point if near else None
 
 
 def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
@@ -200,13 +278,15 @@ def _at_surface(sweep: Sweep, value: float) -> float:
 def _least(sweep: Sweep, value: float) -> float:
     """The least net loss at any density."""
     here, _ = sweep.models(value)
-    log_x = np.linspace(*_LOG_X, _SAMPLES)
+    (low, high), least = _LOG_X, np.inf
     for _ in range(_ZOOMS):
+        log_x = np.linspace(low, high, _SAMPLES)
         f, _ = here.closures(np.exp(log_x))
         net = f[LOSS] - here.slope**2 * f[WORK]
         k = int(np.argmin(net))
-        log_x = np.linspace(log_x[max(k - 1, 0)], log_x[min(k + 1, _SAMPLES - 1)], _SAMPLES)
-    return float(net.min())
+        least = float(net[k])
+        low, high = log_x[max(k - 1, 0)], log_x[min(k + 1, _SAMPLES - 1)]
+    return least
 
 
 def _root(function: Callable[[float], float], low: float, high: float, falling: bool) -> float:

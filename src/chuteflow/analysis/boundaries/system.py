@@ -43,8 +43,8 @@ class Sweep:
         return _models(self, value)
 
     def chute_at(self, value: float) -> Chute:
-        """The chute at a value of the parameter."""
-        return replace(self.chute, **{self.name: value})
+        """The chute at a value of the parameter, which may be beyond the range by rounding."""
+        return replace(self.chute, **{self.name: min(max(value, self.low), self.high)})
 
     def allows(self, value: float) -> bool:
         """Whether the equations are asked for: within the range, or a little beyond it."""

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chuteflow.analysis.boundaries.conditions import Fold, InteriorChange, Local
-from chuteflow.analysis.boundaries.points import BoundaryPoint, as_point, finer, solved, through
+from chuteflow.analysis.boundaries.conditions import Fold, InteriorChange, Local, along
+from chuteflow.analysis.boundaries.edges import left
+from chuteflow.analysis.boundaries.points import BoundaryPoint, as_point, finer, solved
 from chuteflow.analysis.boundaries.seeds import HELD
 from chuteflow.analysis.boundaries.system import BoundarySystem, Sweep
 from chuteflow.analysis.ranges import Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
-from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.solver import DEGREES
 
@@ -28,12 +29,10 @@ _SINGULAR = 1e-5
 #: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
 _BESIDE, _SAME = 0.3, 1e-6
+#: The place of a blunt turn may scatter by so much.
+_BLUNT = 1e-6
 #: A parameter that changes less, per arclength, does not change.
 _NO_RATE = 1e-10
-#: A flow has vanished where its hold-up is below this part of the surface temperature, and of 1.
-_EMPTY = 1e-4
-#: An edge of the range nearer than this is reached.
-_REACHED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ def traced(
     """The boundary through ``start`` to both sides; ``notice`` is called at each point.
 
     Raises:
-        SolveError: where a point could not be solved to ``tolerance``.
+        SolveError: where the start could not be carried on.
     """
     tangent = start.system.tangent(start.w)
     sweep = start.system.sweep
@@ -161,57 +160,46 @@ def _side(
         if point.step == 0.0 or first is None or before is None:
             before = point  # the same point on another grid, or with other borders
             continue
-        edge = _edge(before, point, within, tolerance)
-        if edge is not None:
-            reached, side.end = edge
-            if reached is not None:
-                _note_turn(side, before, point, tolerance, reached)
-                side.points.append(reached)
+        try:
+            ended = _extended(side, first, before, point, within, tolerance)
+        except SolveError:
+            # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
+            side.end, ended = "it is lost in rounding a little further on", True
+        if ended:
             return side
-        _note_turn(side, before, point, tolerance)
-        if len(side.points) > 3 and _returned(first, before, point):
-            side.end, side.closed = "the boundary closes on itself", True
-            return side
-        row = (point.system.weights * point.tangent)[-3:]
-        side.points.append(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
         before = point
     corner = path.status is Status.SHARP_TURN and isinstance(system.condition, InteriorChange)
     side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
     return side
 
 
-def _edge(
-    before: Point[BoundarySystem], point: Point[BoundarySystem], within: Range, tolerance: float
-) -> tuple[BoundaryPoint | None, str] | None:
-    """The point at which a step leaves the range, if it is not the one before, and in words how; None inside."""
-    system, value = point.system, float(point.z[-1])
-    sweep = system.sweep
-    bound = float(np.clip(value, sweep.low, sweep.high))
-    if value != bound:
-        words = f"{sweep.name} = {bound:g} is the end of its range"
-        share = (bound - before.z[-1]) / (value - before.z[-1])
-        if share * abs(value - before.z[-1]) <= _REACHED:
-            return None, words
-        return solved(system, before.z + share * (point.z - before.z), HELD, bound, tolerance), words
+def _extended(
+    side: _Side,
+    first: Point[BoundarySystem],
+    before: Point[BoundarySystem],
+    point: Point[BoundarySystem],
+    within: Range,
+    tolerance: float,
+) -> bool:
+    """Add what a step leads to, and tell whether the side ends there.
 
-    def excess(z: Array) -> tuple[float, str]:
-        """How far, in the logarithm, a flow lies beyond an edge, and in words which; negative within the range."""
-        here = system.problem(float(z[-1])).state(z[:-1]).macroscopic()
-        edges = (
-            (here[LOG_T] - np.log(within.hottest), f"it goes on to surface temperatures above {within.hottest:g}"),
-            (np.log(within.coldest) - here[LOG_T], f"it goes on to surface temperatures below {within.coldest:g}"),
-            (here[LOG_M] - np.log(within.deepest), f"it goes on to hold-ups above {within.deepest:g}"),
-            (np.log(_EMPTY) + min(here[LOG_T], 0.0) - here[LOG_M], "its flows vanish: their density tends to 0"),
-        )
-        return max(edges, key=lambda edge: edge[0])
-
-    beyond, words = excess(point.z)
-    if beyond <= 0.0:
-        return None
-    if excess(before.z)[0] >= 0.0:
-        return None, words
-    there = locate(before, point, system, lambda z, tangent, system: excess(z)[0])
-    return through(system, there.point.z, tolerance), words
+    Raises:
+        SolveError: where a point or turning point could not be solved to ``tolerance``.
+    """
+    edge = left(before, point, within, tolerance)
+    if edge is not None:
+        reached, side.end = edge
+        if reached is not None:
+            _note_turn(side, before, point, tolerance, reached)
+            side.points.append(reached)
+        return True
+    _note_turn(side, before, point, tolerance)
+    if len(side.points) > 3 and _returned(first, before, point):
+        side.end, side.closed = "the boundary closes on itself", True
+        return True
+    row = (point.system.weights * point.tangent)[-3:]
+    side.points.append(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
+    return False
 
 
 def _note_turn(
@@ -236,20 +224,24 @@ def _note_turn(
 
 def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) -> BoundaryPoint:
     """The turning point between two points, on finer grids until it stays where it is."""
-    before: Array | None = None
+    before, settled = np.full(3, np.inf), np.inf
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
         if degree > a.system.degree:
             system, w = finer(a.system, a.z, degree)
             a, b = _corrected(system, w, a), _corrected(system, finer(b.system, b.z, degree)[1], b)
+        if a.tangent[-1] * b.tangent[-1] >= 0.0:
+            raise SolveError("a turning point of a boundary is not there on a finer grid")
         located = locate(a, b, a.system, lambda z, tangent, system: float(tangent[-1]))
         if located.status.failed:
             raise SolveError(f"a turning point of a boundary was not located: {located.status.value}")
         place = located.point.z[-3:] / np.array([1.0, 1.0, max(a.system.sweep.high, 1e-300)])
-        change = np.inf if before is None else float(np.abs(place - before).max())
-        error = max(change, located.error)
-        if change < max(tolerance, located.error):
+        change = float(np.abs(place - before).max())
+        # Where the turn is blunt, rounding moves its place, and finer grids do no better.
+        scattered = settled < _BLUNT and change > 0.5 * settled
+        error = max(change, located.error, settled if scattered else 0.0)
+        if scattered or change < max(tolerance, located.error):
             return as_point(a.system, located.point.z, error)
-        before = place
+        before, settled = place, change
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 
 
@@ -281,8 +273,7 @@ def _definite(at: Local) -> bool:
     """
     u, _, v = np.linalg.svd(at.by_z)
     plane, psi = v[-2:], u[:, -1]
-    problem = at.state.problem
-    bends = [problem.state(at.z + 1j * IMAGINARY_STEP * n).jacobian().imag / IMAGINARY_STEP for n in plane]
+    bends = [along(at, n).jacobian().imag / IMAGINARY_STEP for n in plane]
     hessian = np.array([[psi @ bend @ n for n in plane] for bend in bends])
     return bool(np.linalg.det(hessian) > 0.0)
 

@@ -45,9 +45,11 @@ _SCALE = (_ENTRIES - 1) / (_HIGH - _LOW)
 #: Trajectories end hot below this density x, and cold with y below this multiple of its scale.
 _LOG_EMPTY, _COLD = math.log(1e-6), 4.0
 #: Neighbours part where they differ by more in L, as far as that matters to a base, or in y.
-_APART, _APART_IN_FLUX, _DILUTE = 0.45, 0.2, math.log(3e-3)
+_APART, _APART_IN_FLUX, _DILUTE = 0.65, 0.3, math.log(3e-3)
 _FEWEST, _MOST_COLUMNS = 24, 3000
 _SAME_COLUMN = 1e-6
+#: Derivatives through five columns are taken where gaps differ by less than this factor.
+_EVEN = 12.0
 #: Columns nearer than this have surface temperatures that rounding makes too much alike.
 _SMALLEST_GAP = 1e-8
 
@@ -71,6 +73,8 @@ class Base:
 
 #: Order of the fields of a fan.
 FIELDS = HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST = range(7)
+#: Order of what ``down`` and ``across`` of a fan hold the derivatives of.
+DERIVED = EXCESS, GRIPPED, OF_FLUX, OF_SLIP, OF_GLIDE = range(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,8 @@ class Fan:
     end. The other arrays are (K, C): ``excess`` is y - s^2 shear and ``grip`` G; ``log_mass`` is ln M. ``fields``
     (7, K, C) are by the names of FIELDS y; ln M; the logarithm of M sqrt(T), which times F1 is the flux at the slip
     velocity; that of the flux by shear; the least and the largest net loss, and the largest v so far down.
+    ``down`` and ``across`` (5, K, C) are the derivatives of y - s^2 shear, G and three of the fields, by the names
+    of DERIVED, to the logarithm of p and from column to column, to a positive factor at each point.
     ``spacing`` is that of ln T for a gap of 1.
     """
 
@@ -93,6 +99,8 @@ class Fan:
     grip: Array
     log_mass: Array
     fields: Array
+    down: Array
+    across: Array
     spacing: float
 
     def of_base(self, base: Base) -> Array:
@@ -180,8 +188,8 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
     floor = min(-_COLD * (balance + rate + 2.0 + square), window[0])
     # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux.
     limit = math.sqrt(max(2.0 * net[0] * closures[CONDUCTION, 0], 0.0))
-    within_reach = given[given[:, 0] <= limit, 0]
-    ceiling = float(within_reach.max()) if within_reach.size else 0.0
+    emptiest, fullest = float(given[:, 0].min()), float(given[:, 0].max())
+    ceiling = min(fullest, limit) if emptiest <= limit else 0.0
 
     def derivative(state: Array) -> Array:
         p, big_l, y, _ = state
@@ -226,7 +234,7 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
         if left.size and len(order) + left.size <= _MOST_COLUMNS:
             sources, weights = _between(state, order, gaps, left)
             births.append((len(rows) - 1, sources, weights))
-            born = (state[:, sources] * weights).sum(axis=1)
+            born = _mean(state[:, sources], weights)
             fresh = np.arange(len(order), len(order) + left.size)
             gaps[left] *= 0.5
             gaps = np.insert(gaps, left, gaps[left])
@@ -244,7 +252,7 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
     for k, sources, weights in births:
         depth, count = k + len(thin) - top, sources.shape[1]
         history = states[:depth][:, :, sources]  # (depth, 4, 4, births)
-        states[:depth, :, first : first + count] = (history * weights).sum(axis=2)
+        states[:depth, :, first : first + count] = np.moveaxis(_mean(np.moveaxis(history, 1, 0), weights), 0, 1)
         first += count
     return _Grown(states[:, :, order], order, gaps, len(thin), p1)
 
@@ -299,6 +307,11 @@ def _between(
     weights += np.where(np.arange(4)[:, None] - (left - first) == 1, 0.5, 0.0)
     weights[:, near] = lagrange(at[:, near], inner[near] + 0.5)
     return sources, weights
+
+
+def _mean(states: Array, weights: Array) -> Array:
+    """Means of ``states`` (4, ..., 4, n) by ``weights`` (4, n), of the logarithm of p, which is positive."""
+    return np.concatenate([np.exp((np.log(states[:1]) * weights).sum(axis=-2)), (states[1:] * weights).sum(axis=-2)])
 
 
 def lagrange(at: Array, x: Array) -> Array:
@@ -367,38 +380,85 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     slope = problem.slope
     closures = _table(problem)
     net = closures[LOSS] - slope**2 * closures[WORK]
-    fields = np.stack([*closures[[SHEAR, GRIP, WORK, GAMMA]], net, 1.0 / closures[CONDUCTION]])
-    shear, grip, work, gamma, net, inverse = _interpolated(_with_increments(fields), big_l)
+    wanted = [*closures[[SHEAR, GRIP]], *np.gradient(closures[[SHEAR, GRIP]], axis=1) * _SCALE]
+    wanted += [*closures[[WORK, GAMMA, COUPLING]], net, 1.0 / closures[CONDUCTION]]
+    shear, grip, shear_slope, grip_slope, work, gamma, k, net, inverse = _interpolated(
+        _with_increments(np.stack(wanted)), big_l
+    )
     over = p - problem.surface_stress
-    root_t = np.exp(0.5 * (np.log(p) + gamma - big_l))
-    rate = slope * over * work * root_t  # of the flux by shear, in p
+    log_root_t = 0.5 * (np.log(p) + gamma - big_l)
+    rate = slope * over * work * np.exp(log_root_t)  # of the flux by shear, in p
     glide = 0.5 * rate * over
     below = grown.thin
     turn = p * y * inverse
     pace = p * _advance(p, turn, grown.p1)
     glide[below:] = glide[below] + _running((rate * pace)[below:], tau[below:])
-    log_mass = np.log(over)
+    glide = np.maximum(glide, np.finfo(float).tiny)
+    excess, log_mass = y - slope**2 * shear, np.log(over)
+    log_slip, log_glide = log_mass + log_root_t, np.log(glide)
+    still = 1.0 - turn
+    warming = turn + k * still  # d ln T
+    cooling = p * net - y * (1.0 + 0.5 * warming)  # dy
+    down = [cooling - slope**2 * shear_slope * still, grip_slope * still, cooling]
+    down += [p / over + 0.5 * warming, rate * p / glide]
     return Fan(
         slope=slope,
         gaps=grown.gaps,
         place=columns,
         last=len(p) - 1 - (np.diff(tau[::-1], axis=0) > 0.0).argmax(axis=0),
-        excess=y - slope**2 * shear,
+        excess=excess,
         grip=grip,
         log_mass=log_mass,
         fields=np.stack(
             [
                 y,
                 log_mass,
-                log_mass + np.log(root_t),
-                np.log(np.maximum(glide, np.finfo(float).tiny)),
+                log_slip,
+                log_glide,
                 np.minimum.accumulate(net, axis=0),
                 np.maximum.accumulate(net, axis=0),
                 np.maximum.accumulate(turn, axis=0),
             ]
         ),
+        down=np.stack(down),
+        across=_across(np.stack([excess, grip, y, log_slip, log_glide]), grown.gaps, big_l),
         spacing=spacing,
     )
+
+
+def _across(values: Array, gaps: Array, big_l: Array) -> Array:
+    """Derivatives of ``values`` (..., C) from column to column, to a positive factor for each column.
+
+    Through five columns where they have not parted and their gaps are not too uneven, else through three.
+    """
+    count = len(gaps) + 1
+    out = _through(values, gaps, 3)[0]
+    first = np.clip(np.arange(count) - 2, 0, count - 5)
+    fine, widths = _through(values, gaps, 5)
+    even = (widths > 1.0 / _EVEN).all(axis=0) & (widths < _EVEN).all(axis=0)
+    near = np.abs(big_l[:, first + 4] - big_l[:, first]) < 3.0 * _APART
+    return np.where(even & near, fine, out)
+
+
+def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
+    """Derivatives of ``values`` (..., C) at columns by polynomials through ``points`` of them, in units of a gap of
+    each, and the gaps in these units (points - 1, C)."""
+    count = len(gaps) + 1
+    here = np.arange(count)
+    first = np.clip(here - points // 2, 0, count - points)
+    widths = gaps[first + np.arange(points - 1)[:, None]] / gaps[np.minimum(here, count - 2)]
+    at = np.concatenate([np.zeros((1, count)), np.cumsum(widths, axis=0)])
+    off = at[here - first, here] - at
+    out = np.zeros_like(values)
+    for j in range(points):
+        others = [k for k in range(points) if k != j]
+        own = here - first == j
+        # The factor of the column itself is left out of the product; at the column the weight is the sum of 1/off.
+        product = np.prod([np.where(here - first == k, 1.0, off[k]) for k in others], axis=0)
+        weight = product / np.prod([at[j] - at[k] for k in others], axis=0)
+        weight[own] = np.sum([1.0 / off[k][own] for k in others], axis=0)
+        out += weight * values[..., first + j]
+    return out, widths
 
 
 def _running(rate: Array, tau: Array) -> Array:

@@ -11,12 +11,17 @@ import numpy as np
 from contourpy import contour_generator
 
 from chuteflow.analysis.domains.fan import (
+    EXCESS,
+    GRIPPED,
     HEAT_FLUX,
     LOG_GLIDE,
     LOG_MASS,
     LOG_SLIP,
     NET_HIGH,
     NET_LOW,
+    OF_FLUX,
+    OF_GLIDE,
+    OF_SLIP,
     STEEPEST,
     Base,
     Fan,
@@ -29,6 +34,13 @@ INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
 DENSITIES = {"monotonic": 1, "inverted": 2}
 #: Turns of ln Q along a family are told apart if they differ by more.
 _TURN = 1e-6
+#: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
+#: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
+#: hold-up, is none either.
+_BALANCE, _DEEP, _RISE = 2e-3, 10.0, 1.5e-3
+#: Closed lines that span fewer columns and rows are none; those that span more are, wherever they are; those in
+#: between only so many columns or rows beside other lines.
+_SMALLEST_LOOP, _SMALL_LOOP, _BESIDE = 1.5, 6.0, 8.0
 #: Points of a family that lie nearer, in steps of the grid, say nothing more.
 _NEAR = 0.3
 #: Cubic interpolation is used where neighbouring steps of the grid differ by less than this factor.
@@ -55,21 +67,61 @@ def kinds(fan: Fan, base: Base) -> Kinds:
     """The kinds of the flows that ``base`` has on ``fan``."""
     excess = fan.of_base(base)
     at = _exists(excess[:, fan.place])
-    lines = [line for line in contour_generator(z=excess).lines(0.0) if len(line) > 1]
+    lines = _families([np.asarray(line) for line in contour_generator(z=excess).lines(0.0)])
     if not lines:
         return Kinds(at, 0, 0, 0, 0)
-    chains = [_selected(np.asarray(line)) for line in lines]
-    fields = _at_zeros(fan, excess, np.concatenate(chains))
-    slip = np.maximum(fields[HEAT_FLUX] + base.loss, 0.0) / fan.slope
-    log_flux = np.logaddexp(fields[LOG_SLIP] + np.log(np.maximum(slip, 1e-300)), fields[LOG_GLIDE])
+    chains = [_selected(line) for line in lines]
+    zeros = _at_zeros(fan, excess, np.concatenate(chains))
+    fields = zeros.fields
+    slip = np.maximum(fields[HEAT_FLUX] + base.loss, 1e-300) / fan.slope
+    log_flux = np.logaddexp(fields[LOG_SLIP] + np.log(slip), fields[LOG_GLIDE])
+    rise = _rise(fan, base, zeros, np.exp(fields[LOG_SLIP] - log_flux) * slip)
     ends = np.cumsum([len(chain) for chain in chains])
     pieces, interior, density = [], 0, 0
     for first, last in zip(ends - [len(chain) for chain in chains], ends, strict=True):
         part = slice(first, last)
-        pieces.append(_monotonic_pieces(fields[-1, part], fields[LOG_MASS, part], log_flux[part]))
-        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part])
-        density |= _densities(fields[STEEPEST, part])
+        pieces.append(_monotonic_pieces(zeros.log_t[part], fields[LOG_MASS, part], log_flux[part], rise[part]))
+        holdup = np.exp(fields[LOG_MASS, part])
+        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part], zeros.doubt[:, part], holdup)
+        density |= _densities(fields[STEEPEST, part], zeros.doubt[2, part], holdup)
     return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
+
+
+def _families(lines: list[Array]) -> list[Array]:
+    """The lines (k, 2) that are families of their own.
+
+    Interpolation makes a loop of a dip that stops short of zero, and a string of beads of a tongue of a family that
+    is narrower than the grid: small loops beside other lines are no families.
+    """
+    extent = [float(np.ptp(line, axis=0).max()) if _is_closed(line) else np.inf for line in lines]
+    large = [line for line, size in zip(lines, extent, strict=True) if size > _SMALL_LOOP and len(line) > 1]
+    small = [line for line, size in zip(lines, extent, strict=True) if _SMALLEST_LOOP < size <= _SMALL_LOOP]
+    beads: list[Array] = [line for line, size in zip(lines, extent, strict=True) if size <= _SMALLEST_LOOP]
+    while beside := [line for line in small if any(_are_near(line, other) for other in (*large, *beads))]:
+        beads += beside
+        small = [line for line in small if not any(line is other for other in beside)]
+    return large + small
+
+
+def _is_closed(line: Array) -> bool:
+    return bool((line[0] == line[-1]).all())
+
+
+def _are_near(loop: Array, line: Array) -> bool:
+    off = np.abs(line - loop.mean(axis=0))
+    return bool(((off[:, 0] < _BESIDE) & (off[:, 1] < _BESIDE)).any())
+
+
+def _rise(fan: Fan, base: Base, zeros: _Zeros, slipping: Array) -> Array:
+    """Derivative of ln Q along the zero set, to a factor of one sign on each line; ``slipping`` is the share of
+    the flux at the slip velocity."""
+    size = np.abs(zeros.down).sum(axis=0) + np.abs(zeros.across).sum(axis=0)
+    slopes = []
+    for of in (zeros.down, zeros.across):
+        flux = slipping * (of[OF_SLIP] + of[OF_FLUX] / np.maximum(zeros.fields[HEAT_FLUX] + base.loss, 1e-300))
+        slopes.append((flux + (1.0 - slipping) * of[OF_GLIDE], of[EXCESS] + base.weight * of[GRIPPED]))
+    (flux_down, excess_down), (flux_across, excess_across) = slopes
+    return (flux_across * excess_down - flux_down * excess_across) / size
 
 
 def _exists(excess: Array) -> tuple[bool, ...]:
@@ -81,7 +133,8 @@ def _exists(excess: Array) -> tuple[bool, ...]:
     bend = before - 2.0 * here + after
     dip = (here <= before) & (here <= after) & (bend > 0.0)
     lowest = here - (after - before) ** 2 / (8.0 * np.where(dip, bend, 1.0))
-    return tuple((found | (dip & (lowest < 0.0)).any(axis=0)).tolist())
+    found |= (dip & (lowest < 0.0)).any(axis=0)
+    return tuple(map(bool, np.atleast_1d(found).tolist()))
 
 
 def _selected(line: Array) -> Array:
@@ -104,8 +157,20 @@ def _selected(line: Array) -> Array:
     return kept
 
 
-def _at_zeros(fan: Fan, excess: Array, line: Array) -> Array:
-    """The fields of ``fan`` (7, k) at vertices (k, 2) on edges of the grid, and below them ln T (1, k).
+@dataclass(frozen=True, eq=False)
+class _Zeros:
+    """What there is at k points of the zero set: ``fields`` (7, k), ``down`` and ``across`` (5, k) of a fan there,
+    ``log_t`` (k,), and how far the net losses and the largest v are in ``doubt`` (3, k)."""
+
+    fields: Array
+    down: Array
+    across: Array
+    log_t: Array
+    doubt: Array
+
+
+def _at_zeros(fan: Fan, excess: Array, line: Array) -> _Zeros:
+    """What ``fan`` has at vertices (k, 2) on edges of the grid.
 
     The zero on an edge is that of the cubic through four values in line with it, where the grid is even enough.
     """
@@ -130,9 +195,20 @@ def _at_zeros(fan: Fan, excess: Array, line: Array) -> Array:
         at = np.concatenate([np.zeros((1, len(line))), np.cumsum(widths, axis=0)])[:, even] / unit[even]
         low = at[aside[even], np.arange(at.shape[1])]
         weights[:, even] = lagrange(at, _zero_of_cubic(at, values[:, even], low, low + share[even]))
-    fields = (fan.fields[:, r, c] * weights).sum(axis=1)
+    values = fan.fields[:, r, c]
+    fields = (values * weights).sum(axis=1)
+    # Where there is no cubic, half of what lies between the ends of an edge; else what the cubic differs by.
+    ends = values[NET_LOW:, aside, here], values[NET_LOW:, aside + 1, here]
+    chord = ends[0] + share * (ends[1] - ends[0])
+    doubt = np.where(even, np.abs(fields[NET_LOW:] - chord), 0.5 * np.abs(ends[1] - ends[0]))
     log_t = fan.spacing * np.append(0.0, np.cumsum(fan.gaps))
-    return np.concatenate([fields, [(log_t[c] * weights).sum(axis=0)]])
+    pair = r[aside, here], c[aside, here], r[aside + 1, here], c[aside + 1, here]
+
+    def along_edge(of: Array) -> Array:
+        start, stop = of[:, pair[0], pair[1]], of[:, pair[2], pair[3]]
+        return start + share * (stop - start)
+
+    return _Zeros(fields, along_edge(fan.down), along_edge(fan.across), (log_t[c] * weights).sum(axis=0), doubt)
 
 
 def _zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
@@ -152,21 +228,47 @@ def _zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
     return x
 
 
-def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array) -> Array:
-    """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q."""
-    from scipy.interpolate import CubicSpline
-
+def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> Array:
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q, where ``rise`` changes
+    sign."""
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
-    log_q, at = log_q[keep], np.cumsum(np.append(0.0, length))[keep]
-    if len(at) > 3:
-        spline = CubicSpline(at, log_q)
-        turns = spline.derivative().roots(extrapolate=False)
-        stops = np.concatenate([log_q[:1], spline(turns[np.isfinite(turns)]), log_q[-1:]])
-    else:
-        stops = log_q
+    log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
+    before = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
+    stops = log_q[[0, -1]]
+    if before.size:
+        turns = at[before] + (at[before + 1] - at[before]) * rise[before] / (rise[before] - rise[before + 1])
+        if len(at) > 3:
+            around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
+            turned = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
+        else:
+            turned = np.interp(turns, at, log_q)
+        along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
+        first = along if rise[0] > 0.0 else -along
+        stops = np.array(_confirmed([log_q[0], *turned, log_q[-1]], first))
     ends = np.stack([stops[:-1], stops[1:]], axis=1)
     return np.sort(ends, axis=1)
+
+
+def _confirmed(stops: list[float], rises: float) -> list[float]:
+    """Values at the ends and turns of a family without those turns between which it does not turn.
+
+    It ``rises`` first (1), or falls (-1), and so on in turn.
+    """
+    stops = list(stops)
+    i = 0
+    while len(stops) > 2 and i < len(stops) - 1:
+        if (stops[i + 1] - stops[i]) * rises * (-1.0) ** i > _TURN:
+            i += 1
+        elif i == 0:
+            del stops[1]
+            rises = -rises
+        elif i == len(stops) - 2:
+            del stops[i]
+        else:
+            del stops[i : i + 2]
+            i -= 1
+    return stops
 
 
 def _most(pieces: Array) -> int:
@@ -177,8 +279,12 @@ def _most(pieces: Array) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def _interiors(low: Array, high: Array) -> int:
+def _interiors(low: Array, high: Array, doubt: Array, holdup: Array) -> int:
+    """Bits of INTERIORS; a net loss whose sign is in ``doubt`` (2 or more, k) does not make a flow mixed."""
     found = 0
+    scale = max(float(np.abs(low).max()), float(np.abs(high).max()))
+    rounding = _BALANCE * scale * (1.0 + holdup / _DEEP)
+    low, high = low + (doubt[0] + rounding), high - (doubt[1] + rounding)
     if _peak(low) >= 0.0:
         found |= INTERIORS["dissipative"]
     if _peak(-high) >= 0.0:
@@ -188,11 +294,12 @@ def _interiors(low: Array, high: Array) -> int:
     return found
 
 
-def _densities(steepest: Array) -> int:
+def _densities(steepest: Array, doubt: Array, holdup: Array) -> int:
+    """Bits of DENSITIES; a rise that is in ``doubt`` (k,) does not make a density inverted."""
     found = 0
     if _peak(1.0 - steepest) >= 0.0:
         found |= DENSITIES["monotonic"]
-    if _peak(steepest - 1.0) > 0.0:
+    if _peak(steepest - doubt - 1.0 - _RISE * holdup) > 0.0:
         found |= DENSITIES["inverted"]
     return found
 

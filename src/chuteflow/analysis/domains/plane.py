@@ -13,25 +13,32 @@ from typing import Any
 import numpy as np
 
 from chuteflow.analysis.domains.fan import Base, Fan, fan
-from chuteflow.analysis.domains.kinds import kinds
+from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS, Kinds, kinds
 from chuteflow.analysis.ranges import Range
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
-from chuteflow.theory.hot import dilute, hot_parameters
+from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 from chuteflow.theory.laws import law
 
 #: The four parameters, as :class:`chuteflow.Chute` calls them; the last two are those of the base.
 PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
 _OF_BASE = PARAMETERS[2:]
-#: What a point is classified by, in the order of its code; after these come the temperatures asked for.
-CODES = ("hot", "most", "families", "interior", "density")
+#: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
+#: for. All but the first two are 1 where there are such flows, else 0.
+CODES = ("most", "families", *INTERIORS, *DENSITIES)
+#: The same in few numbers: whether there are hot flows (1, 0, or -1 where the theory does not say), the numbers of
+#: flows that share one flux and of families, and the bits of the kinds of interior and of density.
+SUMMARY = ("hot", "most", "families", "interior", "density")
+#: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
+#: each bound a point is.
+HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
 #: Columns of surface temperature to a decade.
 _PER_DECADE = 12
 #: Bases between the ends of an axis, which bound what a fan has to serve.
 _BETWEEN = 5
 
-#: The class of a point: integers in the order of CODES, then 0 or 1 for each temperature.
+#: The class of a point: integers in the order of CODES, then 0 or 1 for each temperature; or that of HOT_CODES.
 Code = tuple[int, ...]
 
 
@@ -113,10 +120,46 @@ class Plane:
 
 
 def code(plane: Plane, outer: float, inner: float) -> Code:
-    """The class of the point at shares of the outer and inner axis of ``plane``."""
+    """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
+    found = _kinds(plane, plane.chute_at(outer, inner))
+    return (
+        found.most,
+        found.families,
+        *(int(found.interior & bit > 0) for bit in INTERIORS.values()),
+        *(int(found.density & bit > 0) for bit in DENSITIES.values()),
+        *map(int, found.at),
+    )
+
+
+def summary(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
+    found = _kinds(plane, plane.chute_at(outer, inner))
+    hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    return (hot, found.most, found.families, found.interior, found.density)
+
+
+def _kinds(plane: Plane, chute: Chute) -> Kinds:
+    return kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
+
+
+def hot_code(plane: Plane, outer: float, inner: float) -> Code:
+    """What is known in closed form of the point at shares of the outer and inner axis, by HOT_CODES.
+
+    All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
+    than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
+    """
     chute = plane.chute_at(outer, inner)
-    found = kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
-    return (_hot(chute), found.most, found.families, found.interior, found.density, *map(int, found.at))
+    limit = _dilute(chute.closure, chute.restitution, chute.slope if law(chute.closure).knows_slope else 0.0)
+    found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
+    gained, lost = found.F21 > 0.0, found.delta > 0.0
+    strong = gained and lost
+    return (
+        int(found.obstacle is None),
+        int(gained),
+        int(lost),
+        int(strong and found.lambda_ >= LAMBDA_C),
+        int(strong and found.lambda_ > inversion_lambda()),
+    )
 
 
 def _neutral(plane: Plane) -> dict[str, Any]:
@@ -135,14 +178,6 @@ def _fan(plane: Plane, chute: Chute) -> Fan:
     return fan(chute, [Base.of(base) for base in served], plane.within, np.array(plane.temperatures), _PER_DECADE)
 
 
-def _hot(chute: Chute) -> int:
-    """Whether there are hot flows: 1, 0, or -1 where the theory of section 4 does not say."""
-    if chute.surface != "free":
-        return -1
-    limit = _dilute(chute.closure, chute.restitution, chute.slope if law(chute.closure).knows_slope else 0.0)
-    return int(hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope).obstacle is None)
-
-
 @lru_cache(maxsize=64)
-def _dilute(closure: str, e: float, slope: float) -> Any:
+def _dilute(closure: str, e: float, slope: float) -> Dilute:
     return dilute(law(closure), e, slope)

@@ -5,11 +5,13 @@ COMMANDS = {
     "solve": "Every steady flow of a chute at a flux, hold-up, depth or temperature.",
     "curve": "Every family of flows of a chute, with folds and other special points.",
     "boundary": "Folds, onsets of density inversion and changes of interior through a second parameter.",
+    "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
     "sweep": "Every flow of very many chutes, as a study says, into a Zarr store.",
     "figures": "Draw figures of the paper.",
     "claims": "Compute every statement of the paper that can be tested, with a verdict on each.",
     "report": "One page with every figure and claim of the paper, recomputed, and verdicts.",
     "explore": "A page in the browser: drag every parameter, and see every flow.",
+    "stability": "Which flows are stable, and the disturbance that grows fastest.",
     "relax": "Follow a disturbed flow in time, to the steady flow that it comes to.",
 }

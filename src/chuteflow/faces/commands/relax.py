@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,11 +14,15 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from chuteflow.stability.relaxation import Layer, Moment, Outcome
+    from chuteflow.analysis.results import FlowSet
+    from chuteflow.stability.layer import Layer
+    from chuteflow.stability.relaxation import Moment, Outcome
     from chuteflow.steady.flow import Flow
 
-#: Rows of the table that is printed, and nearness that counts as arrival.
-_ROWS, _ARRIVED = 12, 0.01
+#: Rows of the table that is printed; nearness that counts as arrival, if it shrinks, and as rest.
+_ROWS, _ARRIVED, _SETTLED = 12, 0.01, 1e-6
+#: The picture begins at this share of the whole time, on a logarithmic axis.
+_FIRST = 1e-5
 _COLUMNS = {
     "t": "time",
     "Q": "mass_flux",
@@ -29,53 +33,79 @@ _COLUMNS = {
 _SAVED = (".csv", ".json")
 
 
-@click.command("relax", help=COMMANDS["relax"])
+_EPILOG = (
+    "The flow stays the same all along the chute, and its hold-up M what it is: waves along and across the slope "
+    "are left out. The free surface alone is followed.\n\n"
+    "Example: chuteflow relax --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --heat 1.2"
+)
+
+
+@click.command("relax", help=COMMANDS["relax"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
-@options.option("--flow", "which", type=int, help="Which of the flows found, 1 for the hottest (the default).")
-@options.option("--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default.")
+@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.option(
+    "--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default, or 1 with --push."
+)
 @options.option("--push", type=options.Number(), help="Factor on the velocity; 1 by default.")
 @options.option("--duration", type=options.Number(), help="Time in sqrt(d/(g cos theta)); 2000 by default.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
 @options.option("--save", metavar="FILE", help="Write the way to FILE: .csv or .json.")
-def command(as_json: bool, **given: Any) -> None:
+def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
-    from chuteflow.analysis.enumeration import flows
+    from chuteflow.faces import contract
     from chuteflow.faces.writing import require_writable
-    from chuteflow.stability.relaxation import Layer, disturbed, outcome
+    from chuteflow.stability.relaxation import outcome
 
-    chute = options.chute(given)
     for name, suffixes in (("save", _SAVED), ("plot", options.DRAWN)):
         if given[name] is not None:
             require_writable(given[name], suffixes)
     duration = 2000.0 if given["duration"] is None else given["duration"]
     if not 0.0 < duration <= 1e8:
         raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
-    asked: dict[str, Any] = options.condition(given, chute, None)
-    found = flows(chute, **asked)
+    found = _found(given)
     if not len(found):
-        click.echo(json.dumps({"flows": [], "reason": found.reason}) if as_json else f"no flow: {found.reason}")
+        empty = {"chute": contract.chute_object(found.chute), "flows": [], "reason": found.reason}
+        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
         return
-    number = 1 if given["which"] is None else given["which"]
-    if not 1 <= number <= len(found):
-        raise InputError(f"--flow {number}: there are {len(found)}, choose from 1 (hottest) to {len(found)}")
-    flow = found[number - 1]
-    layer = Layer.of(flow)
-    start = disturbed(
-        layer,
-        layer.steady(flow),
-        temperature=1.1 if given["heat"] is None else given["heat"],
-        velocity=1.0 if given["push"] is None else given["push"],
-    )
+    flow = _chosen(found, given["which"])
+    layer, start = _start(flow, given["heat"], given["push"])
     moments = _followed(layer, start, duration)
     end = outcome(layer, moments)
     content = _content(flow, moments, end)
     if given["save"] is not None:
         _save(content, given["save"])
     if given["plot"] is not None:
-        _plot(moments, end, given["plot"])
-    click.echo(json.dumps(content, allow_nan=False) if as_json else _told(flow, moments, end))
+        _plot(flow, moments, end, given["plot"])
+    click.echo(contract.text(content) if given["as_json"] else "\n".join(_told(flow, moments, end)))
+
+
+def _found(given: Mapping[str, Any]) -> FlowSet:
+    from chuteflow.analysis.enumeration import flows
+
+    chute = options.chute(given)
+    asked: dict[str, Any] = options.condition(given, chute, None)
+    return flows(chute, **asked)
+
+
+def _chosen(found: FlowSet, which: int | None) -> Flow:
+    number = 1 if which is None else which
+    if not 1 <= number <= len(found):
+        allowed = "there is one flow, number 1" if len(found) == 1 else f"choose from 1 (hottest) to {len(found)}"
+        raise InputError(f"--flow {number}: {allowed}")
+    return found[number - 1]
+
+
+def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:
+    """The layer and its disturbed state."""
+    from chuteflow.stability.layer import Layer
+    from chuteflow.stability.relaxation import disturbed
+
+    layer = Layer.of(flow)
+    if heat is None:
+        heat = 1.1 if push is None else 1.0
+    return layer, disturbed(layer.steady(flow), temperature=heat, velocity=1.0 if push is None else push)
 
 
 def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
@@ -84,12 +114,14 @@ def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
 
     moments: list[Moment] = []
     shown = time.monotonic()
-    telling = click.get_text_stream("stderr").isatty()
+    telling = sys.stderr.isatty()
     for moment in relax(layer, start, duration):
         moments.append(moment)
         if telling and time.monotonic() > shown + 1.0:
             shown = time.monotonic()
-            click.echo(f"t = {moment.time:.6g} of {duration:.6g}", err=True)
+            click.echo(f"\r\x1b[Kt = {moment.time:.6g} of {duration:.6g}", nl=False, err=True)
+    if telling:
+        click.echo("\r\x1b[K", nl=False, err=True)
     return moments
 
 
@@ -104,52 +136,77 @@ def _content(flow: Flow, moments: Sequence[Moment], end: Outcome) -> dict[str, A
         "nearest": end.nearest,
         "distance": end.distance if end.nearest is not None else None,
         "rate": end.rate,
+        "arrested": end.arrested,
     }
 
 
-def _told(flow: Flow, moments: Sequence[Moment], end: Outcome) -> str:
+def _told(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Iterator[str]:
+    from chuteflow.faces import words
     from chuteflow.faces.tables import number, table
 
     wanted = {round(i * (len(moments) - 1) / (_ROWS - 1)) for i in range(_ROWS)}
     rows = [[number(getattr(moments[i], name)) for name in _COLUMNS.values()] for i in sorted(wanted)]
-    return f"{table([list(_COLUMNS), *rows])}\n\n{_verdict(flow, moments[-1], end)}"
+    yield words.chute(flow.chute)
+    yield ""
+    yield table([list(_COLUMNS), *rows])
+    yield ""
+    yield _verdict(flow, moments[-1], end)
 
 
 def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
     from chuteflow.faces.tables import number
 
+    if end.arrested:
+        return f"it comes to rest at t = {number(last.time)}: collisions take more energy than the slope gives"
     if end.nearest is None:
         return f"no steady flow has this hold-up within the range searched, M = {number(flow.mass_holdup)}"
     target = end.steady[end.nearest]
     same = abs(target.surface_temperature / flow.surface_temperature - 1.0) < 1e-6
     name = "the flow it came from" if same else f"another flow of the same hold-up, Q = {number(target.mass_flux)}"
     away = f"{100.0 * end.distance:.2g} % away"
-    pace = f"the distance changes at the rate {end.rate:.4g}"
+    if end.distance < _SETTLED:
+        return f"it has come to {name}: {away} at t = {number(last.time)}"
+    pace = f"the distance changes at the rate {number(end.rate)}"
     if end.distance < _ARRIVED and end.rate < 0.0:
-        return f"it comes to {name}: {away} at t = {number(last.time)}; {pace}"
-    return f"not settled at t = {number(last.time)}: the nearest is {name}, {away}; {pace}; give a longer --duration"
+        return f"it comes to {name}: {away} at t = {number(last.time)}, and {pace}"
+    return (
+        f"not settled at t = {number(last.time)}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
+    )
 
 
 def _save(content: dict[str, Any], path: str) -> None:
+    from chuteflow.faces import contract
     from chuteflow.faces.writing import written_beside
 
     with written_beside(path) as partial:
         if path.lower().endswith(".json"):
-            partial.write_text(json.dumps(content, allow_nan=False) + "\n", encoding="utf-8")
+            partial.write_text(contract.text(content) + "\n", encoding="utf-8")
         else:
             rows = zip(*(content[symbol] for symbol in _COLUMNS), strict=True)
             lines = [",".join(_COLUMNS), *(",".join(map(repr, row)) for row in rows)]
             partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _plot(moments: Sequence[Moment], end: Outcome, path: str) -> None:
-    from chuteflow.faces.plots import write_figure
+def _plot(flow: Flow, moments: Sequence[Moment], end: Outcome, path: str) -> None:
+    """Q, h and T at the base against the logarithm of time, and their values in the steady flows."""
+    from matplotlib.lines import Line2D
+
+    from chuteflow.faces.plots import parameters, write_figure
     from chuteflow.paper import style
 
-    figure, axes = style.panels(3, height=3.0)
+    figure, axes = style.panels(3, height=3.1)
+    rest = style.Stroke(style.BLACK, style.DOTTED)
+    later = [moment for moment in moments if moment.time > _FIRST * moments[-1].time]
     for ax, name in zip(axes, ("mass_flux", "centre_of_mass", "base_temperature"), strict=True):
-        ax.plot([m.time for m in moments], [getattr(m, name) for m in moments], **style.stroke(0).line())
-        for flow in end.steady:
-            ax.axhline(getattr(flow, name), linestyle=":", color=style.BLACK, linewidth=0.8)
-        style.name_axes(ax, "time $t$", style.label(name))
+        ax.plot([m.time for m in later], [getattr(m, name) for m in later], **style.stroke(0).line())
+        for steady in end.steady:
+            ax.axhline(getattr(steady, name), **rest.line(0.8))
+        ax.set_xscale("log")
+        style.name_axes(ax, "time, $t$", style.label(name))
+    key = [
+        Line2D([], [], label="disturbed flow", **style.stroke(0).line()),
+        Line2D([], [], label=f"steady flows of the hold-up $M = {flow.mass_holdup:.4g}$", **rest.line(0.8)),
+    ]
+    style.caption(figure, parameters(flow.chute))
+    style.legend(figure, handles=key, loc="outside lower center", ncols=2)
     write_figure(figure, path)

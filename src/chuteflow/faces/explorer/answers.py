@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,24 +13,30 @@ import numpy as np
 
 from chuteflow.analysis.curve import curve
 from chuteflow.analysis.enumeration import flows
-from chuteflow.analysis.results import KINDS, Branch, FlowSet
+from chuteflow.analysis.results import KINDS, Branch
 from chuteflow.errors import ChuteflowError, InputError
-from chuteflow.faces import contract, words
-from chuteflow.faces.explorer import queries
-from chuteflow.steady.chute import Chute
+from chuteflow.faces import contract
+from chuteflow.faces.explorer import queries, sentences
+from chuteflow.faces.explorer.queries import GRAINS, Query
+from chuteflow.faces.explorer.recipes import recipes
 from chuteflow.steady.flow import Flow
-
-Query = Mapping[str, str]
 
 #: Relative error allowed: far below what can be seen on a page. Exports are exact.
 _VISIBLE = 1e-6
-_CURVE_POINTS = 120
-_HEIGHTS = 81
-#: Profiles reach so many times the largest centre of mass.
+_CURVE_POINTS = 90
+#: Heights of a profile: in the flow itself, and above it up to where the profiles of all flows end.
+_WITHIN, _ABOVE = 61, 20
+#: A flow itself is so many times as high as its centre of mass; so are all profiles, by the highest of the flows.
 _TOP = 2.5
-_FIELDS = {"z": "height", "nu": "volume_fraction", "T": "granular_temperature", "u": "velocity"}
+_FIELDS = {
+    "z": "height",
+    "nu": "volume_fraction",
+    "T": "granular_temperature",
+    "u": "velocity",
+    "production": "production",
+    "dissipation": "dissipation",
+}
 _DIGITS = 7
-_COUNTS = ("No flow carries", "One flow carries", "Two flows share", "Three flows share", "Four flows share")
 
 
 @dataclass(frozen=True)
@@ -63,8 +69,8 @@ def _json(content: Any, status: int = 200) -> Answer:
 
 
 def _flows(query: Query) -> Answer:
-    chute, other = queries.read(query, other=("Q",))
-    flux = queries.flux(other["Q"])
+    chute, other = queries.read(query, other=("Q",), optional=GRAINS)
+    flux, scales = queries.flux(other["Q"]), queries.scales(other)
     found = flows(chute, Q=flux, tolerance=_VISIBLE)
     top = _TOP * max((flow.centre_of_mass for flow in found), default=1.0)
     content = contract.flow_set_object(found)
@@ -72,14 +78,20 @@ def _flows(query: Query) -> Answer:
         entry |= {
             "profile": _profile(flow, top),
             "budget": asdict(flow.energy_budget) | {"heat_from_base": flow.energy_budget.heat_from_base},
-            "words": f"{words.among(flow, found)}: {words.kinds(flow)}",
-            "name": words.among(flow, found),
+            **sentences.of_flow(flow, found),
         }
-    return _json(content | {"top": top, "says": _says(found, flux), "recipes": _recipes(chute, flux)})
+    says = sentences.of_flows(found, flux, scales)
+    return _json(content | {"top": top, "says": says, "recipes": recipes(chute, flux, scales)})
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
-    profile = flow.sampled(_HEIGHTS, min(top, flow.interface_height))
+    """Fields over height, closest in the flow itself, where they change."""
+    highest = min(top, flow.interface_height)
+    own = min(_TOP * flow.centre_of_mass, highest)
+    heights = np.linspace(0.0, own, _WITHIN)
+    if own < highest:
+        heights = np.append(heights, np.linspace(own, highest, _ABOVE + 1)[1:])
+    profile = flow.profile(heights)
     return {symbol: _short(getattr(profile, name)) for symbol, name in _FIELDS.items()}
 
 
@@ -87,36 +99,14 @@ def _short(values: np.ndarray) -> list[float]:
     return [float(f"{value:.{_DIGITS}g}") for value in values]
 
 
-def _says(found: FlowSet, flux: float) -> str:
-    count = len(found)
-    lead = _COUNTS[count] if count < len(_COUNTS) else f"{count} flows share"
-    if not count:
-        return f"{lead} Q = {flux:.4g}: {found.reason}."
-    return f"{lead} the flux Q = {flux:.4g}."
-
-
-def _recipes(chute: Chute, flux: float) -> dict[str, str]:
-    """The command and the lines of Python that give the same flows."""
-    options = " ".join(f"--{short} {_text(value)}" for short, value in contract.chute_object(chute).items())
-    arguments = ", ".join(f"{name}={value!r}" for name, value in chute.as_dict().items())
-    return {
-        "command": f"chuteflow solve {options} --flux {_text(flux)}",
-        "python": f"import chuteflow\nchute = chuteflow.Chute({arguments})\nflows = chuteflow.flows(chute, Q={flux!r})",
-    }
-
-
-def _text(value: float | str) -> str:
-    return value if isinstance(value, str) else repr(value)
-
-
 def _curve(query: Query) -> Answer:
-    chute, _ = queries.read(query)
+    chute, other = queries.read(query, optional=GRAINS)
+    scales = queries.scales(other)
     found = curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
     content = contract.curve_object(found)
     for branch, entry in zip(found.branches, content["branches"], strict=True):
         entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
-    says = f"{words.multiplicity(found, None)}." if found.branches else f"No flow at any flux: {found.reason}."
-    return _json(content | {"says": says[0].upper() + says[1:], "kinds": KINDS})
+    return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
 
 
 def _rounded(branch: Branch) -> dict[str, list[float]]:
@@ -124,10 +114,32 @@ def _rounded(branch: Branch) -> dict[str, list[float]]:
     return {symbol: _short(getattr(branch, name)) for symbol, name in names.items()}
 
 
+def _map(query: Query) -> Answer:
+    from chuteflow.faces.explorer.domains import map_column
+
+    chute, (x, y), place = queries.plane(query)
+    return _json(asdict(map_column(chute, x, y, place)))
+
+
+def _stability(query: Query) -> Answer:
+    from chuteflow.faces.explorer.growth import verdict
+
+    chute, other = queries.read(query, other=("Q", "flow"), optional=GRAINS)
+    scales = queries.scales(other)
+    found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
+    number = other["flow"]
+    if number not in map(str, range(len(found))):
+        raise InputError(f"flow = {number[:40]!r}: there are {len(found)} flows, counted from 0")
+    known = verdict(found[int(number)])
+    says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
+    return _json(asdict(known) | {"says": says, "waves": waves})
+
+
 def _export(query: Query) -> Answer:
     from chuteflow.faces import files, plots
 
-    chute, other = queries.read(query, other=("Q", "what", "format"))
+    chute, other = queries.read(query, other=("Q", "what", "format"), optional=GRAINS)
+    scales = queries.scales(other)
     kinds: dict[str, Callable[[], Any]] = {
         "profiles": lambda: flows(chute, Q=queries.flux(other["Q"])),
         "curve": lambda: curve(chute),
@@ -141,9 +153,10 @@ def _export(query: Query) -> Answer:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"chuteflow-{what}.{suffix}"
         if suffix == "csv":
-            files.save(result, path)
+            files.save(result, path, scales=scales)
         else:
-            plots.write_figure((plots.plot_flows if what == "profiles" else plots.plot_curve)(result), path)
+            draw = plots.plot_flows if what == "profiles" else plots.plot_curve
+            plots.write_figure(draw(result, scales=scales), path)
         return Answer(200, media[suffix], path.read_bytes(), path.name)
 
 
@@ -151,5 +164,7 @@ def _export(query: Query) -> Answer:
 QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "flows": _flows,
     "curve": _curve,
+    "map": _map,
+    "stability": _stability,
     "export": _export,
 }

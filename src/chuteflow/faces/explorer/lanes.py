@@ -6,9 +6,10 @@ import asyncio
 import multiprocessing
 import os
 import signal
+import threading
 from collections import OrderedDict
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol
 
@@ -16,6 +17,11 @@ from chuteflow.faces.explorer.answers import Answer, answer, problem
 
 #: Answers that a lane remembers, and questions that wait in it at most.
 _REMEMBERED, _WAITING = 256, 64
+#: Seconds after which it is looked again whether anybody still waits for an answer.
+_PATIENCE = 0.2
+
+#: Tells whether who asked is gone.
+Gone = Callable[[], Awaitable[bool]]
 
 
 class Pipe(Protocol):
@@ -35,17 +41,24 @@ class Lane:
 
     Args:
         limit: seconds that one question may take.
+        nice: by how much the priority of the process is lower than that of this one, 0 to 19.
+        breaks_off: a question in work that nobody waits for any more is broken off.
     """
 
-    def __init__(self, limit: float) -> None:
+    def __init__(self, limit: float, *, nice: int = 0, breaks_off: bool = False) -> None:
         self._limit = limit
+        self._nice = nice
+        self._breaks_off = breaks_off
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._waiting = 0
         self._remembered: OrderedDict[tuple[str, frozenset[tuple[str, str]]], Answer] = OrderedDict()
         self._process: SpawnProcess | None = None
         self._pipe: Pipe | None = None
+        # Which question is in work, so that another is never broken off in its place.
+        self._lock = threading.Lock()
+        self._in_work: object | None = None
 
-    async def ask(self, question: str, query: Mapping[str, str]) -> Answer:
+    async def ask(self, question: str, query: Mapping[str, str], gone: Gone | None = None) -> Answer:
         """The answer, remembered or computed; one that says so where too many wait or time is up."""
         key = question, frozenset(query.items())
         if key in self._remembered:
@@ -55,7 +68,7 @@ class Lane:
             return problem(503, f"{_WAITING} questions wait already: ask again in a moment")
         self._waiting += 1
         try:
-            given = await asyncio.get_running_loop().run_in_executor(self._thread, self._put, question, dict(query))
+            given = await self._computed(question, dict(query), gone)
         finally:
             self._waiting -= 1
         if given.status == 200 and given.name is None:
@@ -66,10 +79,37 @@ class Lane:
 
     def close(self) -> None:
         """End the process; a question in work is lost."""
-        self._stop()
         self._thread.shutdown(wait=False, cancel_futures=True)
+        self._stop()
 
-    def _put(self, question: str, query: dict[str, str]) -> Answer:
+    async def _computed(self, question: str, query: dict[str, str], gone: Gone | None) -> Answer:
+        ticket = object()
+        work = self._thread.submit(self._work, ticket, question, query)
+        waited = asyncio.wrap_future(work)
+        while gone is not None and not (await asyncio.wait({waited}, timeout=_PATIENCE))[0]:
+            if await gone():
+                return self._broken_off(ticket, work)
+        return await waited
+
+    def _broken_off(self, ticket: object, work: Future[Answer]) -> Answer:
+        """Take back a question that waits, and where that is wanted also one in work."""
+        if not work.cancel() and self._breaks_off:
+            with self._lock:
+                if self._in_work is ticket and self._process is not None:
+                    self._process.kill()
+        return problem(499, "nobody waits for this answer")
+
+    def _work(self, ticket: object, question: str, query: dict[str, str]) -> Answer:
+        with self._lock:
+            self._in_work = ticket
+        try:
+            return self.put(question, query)
+        finally:
+            with self._lock:
+                self._in_work = None
+
+    def put(self, question: str, query: dict[str, str]) -> Answer:
+        """The answer of the process, waited for in this thread."""
         try:
             pipe = self._started()
             pipe.send((question, query))
@@ -87,7 +127,7 @@ class Lane:
             os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
             context = multiprocessing.get_context("spawn")
             near, far = context.Pipe()
-            process = context.Process(target=_serve, args=(far,), daemon=True)
+            process = context.Process(target=_serve, args=(far, self._nice), daemon=True)
             process.start()
             far.close()
             self._pipe, self._process = near, process
@@ -103,9 +143,11 @@ class Lane:
             pipe.close()
 
 
-def _serve(pipe: Pipe) -> None:
+def _serve(pipe: Pipe, nice: int) -> None:
     """Answer until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(nice)
     while True:
         try:
             question, query = pipe.recv()

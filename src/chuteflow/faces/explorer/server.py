@@ -6,7 +6,7 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +22,7 @@ from chuteflow.errors import InputError
 from chuteflow.faces.explorer import queries
 from chuteflow.faces.explorer.answers import QUESTIONS, Answer
 from chuteflow.faces.explorer.lanes import Lane
-from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import QUANTITIES
-from chuteflow.theory.laws import LAWS
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -33,10 +31,25 @@ if TYPE_CHECKING:
 #: Names of this machine that no other can reach it by.
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 PAGE = Path(__file__).parent / "page"
-#: Which lane answers what: quick ones never wait for slow ones.
-_LANES = {"flows": "quick", "curve": "curve", "export": "slow"}
-#: Seconds that one question may take in a lane.
-_LIMITS = {"quick": 10.0, "curve": 20.0, "slow": 60.0}
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """Seconds that one answer may take, by how much its process gives way, and whether it is broken off unheard."""
+
+    limit: float
+    nice: int
+    breaks_off: bool = False
+
+
+#: Each question has a process of its own, so that quick ones never wait for slow ones; and slow ones give way.
+_TERMS = {
+    "flows": _Terms(10.0, 0),
+    "curve": _Terms(20.0, 0),
+    "export": _Terms(60.0, 4),
+    "map": _Terms(30.0, 10),
+    "stability": _Terms(60.0, 12, breaks_off=True),
+}
 _LONGEST_QUERY = 1000
 _HEADERS = {
     b"content-security-policy": b"default-src 'self'; img-src 'self' data: blob:; style-src 'self'; "
@@ -48,7 +61,7 @@ _HEADERS = {
 
 
 class Guard:
-    """Refuses requests for another host, longer than any of ours, or that would change something."""
+    """Refuses requests for another host, from pages of another, longer than any of ours, or that change something."""
 
     def __init__(self, app: ASGIApp, hosts: Sequence[str] | None) -> None:
         self._app = app
@@ -69,9 +82,12 @@ class Guard:
         await (refusal or self._app)(scope, receive, send_guarded)
 
     def _refusal(self, scope: Scope) -> Response | None:
-        host = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"host"), "")
+        headers = {name: value.decode("latin-1") for name, value in reversed(scope["headers"])}
+        host = headers.get(b"host", "")
         if self._hosts is not None and host_of(host) not in self._hosts:
             return _error(400, f"host {host[:80]!r} is not served: ask for {' or '.join(self._hosts)}")
+        if headers.get(b"sec-fetch-site") == "cross-site" and headers.get(b"sec-fetch-mode") != "navigate":
+            return _error(403, "pages of other servers are not answered")
         if scope["method"] not in ("GET", "HEAD"):
             return _error(405, f"{scope['method'][:20]} is not served: GET alone")
         if len(scope["query_string"]) > _LONGEST_QUERY:
@@ -87,14 +103,14 @@ def host_of(header: str) -> str:
 
 def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
     """The application, for requests to one of ``hosts``, or to any for None."""
-    lanes = {name: Lane(limit) for name, limit in _LIMITS.items()}
+    lanes = {question: Lane(**asdict(_TERMS[question])) for question in QUESTIONS}
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         first = {name: str(value) for name, value in queries.PRESETS[0].state.items()}
         chute = {name: value for name, value in first.items() if name != "Q"}
         warming = [
-            asyncio.ensure_future(lanes["quick"].ask("flows", first)),
+            asyncio.ensure_future(lanes["flows"].ask("flows", first)),
             asyncio.ensure_future(lanes["curve"].ask("curve", chute)),
         ]
         yield
@@ -109,7 +125,7 @@ def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
             repeated = next((name for name in names if names.count(name) > 1), None)
             if repeated is not None:
                 return _error(400, f"{repeated[:40]!r} is given several times: give it once")
-            return _response(await lanes[_LANES[question]].ask(question, request.query_params))
+            return _response(await lanes[question].ask(question, request.query_params, request.is_disconnected))
 
         return respond
 
@@ -139,7 +155,8 @@ def bound(host: str, port: int | None) -> socket.socket:
         raise InputError(f"--host {host!r}: not an address of this machine, try 127.0.0.1") from None
     problem = ""
     for number in wanted:
-        listener = socket.socket(family, socket.SOCK_STREAM)
+        # With the protocol named, asyncio sends small answers at once instead of waiting for more to send.
+        listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((address[0], number))
@@ -162,8 +179,7 @@ async def _about(_: Request) -> Response:
             "version": __version__,
             "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
             "presets": [{"title": preset.title, "state": dict(preset.state)} for preset in queries.PRESETS],
-            "surfaces": list(SURFACES),
-            "closures": list(LAWS),
+            "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
             "quantities": {
                 quantity.symbol: {
                     "description": quantity.description,

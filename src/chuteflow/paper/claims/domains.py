@@ -117,6 +117,30 @@ def minimum_slope() -> Finding:
 
 
 @claim(
+    "lambda-zero-agrees",
+    "section 4.3, figure 14(a)",
+    "The curve lambda = 0 is in good agreement with the boundary at which solutions of the full equations are found.",
+)
+def lambda_zero_agrees() -> Finding:
+    """Whether there are flows just on the steeper side of the curve, at two temperatures of figure 14."""
+    limit = hot(dissipative(SLOPE)).parameters.dilute
+    roughness = (0.5, 0.6, 0.7, 0.8)
+    found = {}
+    for factor in (0.995, 1.005):
+        slopes = [factor * (slope_at(limit, 0.8, r, 0.0) or math.nan) for r in roughness]
+        chutes = [Chute(slope, 0.8, 0.8, r) for slope, r in zip(slopes, roughness, strict=True)]
+        found[factor] = exists_at(chutes, [10.0, 500.0])
+    near = bool(found[1.005].all() and not found[0.995].any())
+    return decide(
+        "good agreement",
+        "within 0.5 %" if near else "apart",
+        holds=near,
+        reason="At T_inf = 10 and 500 and r = 0.5, 0.6, 0.7 and 0.8 there are flows on slopes 0.5 % above the curve, "
+        f"in {found[1.005].mean():.0%} of these cases, and 0.5 % below it in {found[0.995].mean():.0%}.",
+    )
+
+
+@claim(
     "small-cold-region",
     "section 4.3, figure 14(a)",
     "Beyond the curve lambda = 0 there are flows in a small region with tan(theta) > 0.35 and r > 0.83, at T_inf = 1 "

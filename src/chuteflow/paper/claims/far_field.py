@@ -84,7 +84,7 @@ def far_gradient() -> Finding:
         corrected=falls and all(close(value, -printed, 1e-3) for value in found.values()),
         reason="The factor of nu in the flows of figure 2.",
         correction="With dnu/dz = -nu/T (3.20) in (3.6) the sign is minus; the temperature falls towards T_inf, as "
-        "(3.24) says.",
+        "(3.24) says. A minus may be missing in our copy of the paper alone: nothing else follows from it.",
     )
 
 

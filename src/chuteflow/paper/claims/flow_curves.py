@@ -7,7 +7,9 @@ import math
 
 import numpy as np
 
-from chuteflow import Curve, Flow, flows
+from chuteflow import Curve, Flow, flows, hot
+from chuteflow.analysis.domains import exists_at
+from chuteflow.analysis.ranges import DEEPEST
 from chuteflow.paper.claims.cold import cold_slope_bounds
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import GENTLE, SLOPE, STEEP, all_flows, count, curve_of, folds
@@ -17,6 +19,31 @@ from chuteflow.theory.laws import law
 
 def _curve(slope: float) -> Curve:
     return curve_of(dissipative(slope))
+
+
+@claim(
+    "finite-range-of-slopes",
+    "section 3.5",
+    "For fixed material parameters steady solutions are found only for a finite range of inclination angles.",
+)
+def finite_range_of_slopes() -> Finding:
+    """Slopes with any flow in steps of 0.01, for e = e_w = 0.8 and r = 0.6, with hold-ups up to 300."""
+    slopes = np.arange(0.1, 0.6001, 0.01)
+    temperatures = np.geomspace(1e-4, 1e4, 9)
+    chutes = [dissipative(float(slope)) for slope in slopes]
+    with_flow = np.flatnonzero(np.any(exists_at(chutes, temperatures, DEEPEST), axis=1))
+    low, high = (float(slopes[with_flow[end]]) if with_flow.size else math.nan for end in (0, -1))
+    gaps = bool(np.any(np.diff(with_flow) > 1))
+    coldest = cold_slope_bounds(dissipative(SLOPE))[0]
+    bounds = hot(dissipative(SLOPE)).slope_bounds
+    hottest = bounds.highest if bounds else math.nan
+    return decide(
+        "finite",
+        {"from tan(theta)": low, "to tan(theta)": high},
+        holds=not gaps and coldest < low < coldest + 0.011 and hottest - 0.011 < high < hottest,
+        reason=f"In steps of 0.01 from 0.1 to 0.6, T_inf from 1e-4 to 1e4, hold-ups up to {DEEPEST:g}. The limits of "
+        f"the coldest and of hot flows are {coldest:.4g} and {hottest:.4g}.",
+    )
 
 
 @claim(

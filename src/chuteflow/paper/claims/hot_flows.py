@@ -40,6 +40,26 @@ def slope_of_lambda(lambda_: float) -> float:
 
 
 @claim(
+    "hot-is-dilute",
+    "section 4.1",
+    "The regime of high temperature also corresponds to dilute flows.",
+)
+def hot_is_dilute() -> Finding:
+    """The largest volume fraction times T_inf, against that of the exact solution."""
+    limit = _model(dissipative(SLOPE)).largest_volume_fraction or math.nan
+    found = {T: T * hot_flow(dissipative(SLOPE), T).largest_volume_fraction for T in (1e2, 1e3, 1e4, 1e5)}
+    distances = [value / limit - 1.0 for value in found.values()]
+    return decide(
+        "nu << 1",
+        {f"largest nu at T_inf = {T:g}": value / T for T, value in found.items()},
+        holds=_like_inverse_temperature(distances),
+        reason=f"The largest nu tends to {limit:.4g}/T_inf, at tan(theta) = 0.3; relative distances from that are "
+        + ", ".join(f"{d:.2g}" for d in distances)
+        + ", which fall like 1/T_inf.",
+    )
+
+
+@claim(
     "base-sign",
     "section 4.1, (4.3)",
     "F21 is the flux from the base over nu T^(3/2) of hot flows: productive boundary if positive, dissipative if "
@@ -148,13 +168,17 @@ def _laws() -> dict[str, list[float]]:
     return found
 
 
+def _like_inverse_temperature(distances: list[float]) -> bool:
+    """Whether distances at temperatures that rise by tens fall by tens."""
+    return all(close(b, 0.1 * a, 0.1) for a, b in itertools.pairwise(distances))
+
+
 def _law(quantity: str, name: str, limit: float, words: str) -> Finding:
     distances = _laws()[quantity]
-    steady = all(close(b, 0.1 * a, 0.1) for a, b in itertools.pairwise(distances))
     return decide(
         words,
         {name: limit, "distance at 1e5": distances[-1]},
-        holds=steady and abs(distances[-1]) < 1e-4,
+        holds=_like_inverse_temperature(distances) and abs(distances[-1]) < 1e-4,
         reason="Relative distances of full solutions at T_inf = 1e2, 1e3, 1e4, 1e5, tan(theta) = 0.3: "
         + ", ".join(f"{d:.2g}" for d in distances)
         + ", which fall like 1/T_inf.",
@@ -243,6 +267,26 @@ def lambda_below_one() -> Finding:
     )
 
 
+@claim(
+    "lambda-diverges",
+    "section 4.2, figure 11",
+    "lambda diverges as delta tends to 0, on either side with the sign of delta.",
+)
+def lambda_diverges() -> Finding:
+    """lambda delta on either side of the slope where delta = 0, against 3 F21^2/(2 g30) there."""
+    limit = _model(dissipative(SLOPE)).parameters.dilute
+    balance = math.sqrt(limit.g20 * limit.g52)
+    residue = 1.5 * _model(dissipative(balance)).parameters.F21 ** 2 / limit.g30
+    sides = [_model(dissipative(factor * balance)).parameters for factor in (1.0 - 1e-6, 1.0 + 1e-6)]
+    below, above = (p.lambda_ for p in sides)
+    return decide(
+        "diverges",
+        {"just below": below, "just above": above},
+        holds=below > 1e5 and above < -1e5 and all(close(p.lambda_ * p.delta, residue, 1e-4) for p in sides),
+        reason=f"At slopes 1e-6 off {balance:.5g}, where delta = 0; lambda delta tends to {residue:.5g} there.",
+    )
+
+
 @claim("slope-at-lambda-one", "section 4.2, figure 13", "lambda = 1 at tan(theta) = 0.354.")
 def slope_at_lambda_one() -> Finding:
     """The slope in closed form, put back into (4.14)."""
@@ -253,6 +297,30 @@ def slope_at_lambda_one() -> Finding:
         bound,
         holds=rounds_to(bound, "0.354") and close(back, 1.0, 1e-9),
         reason=f"(4.14) at this slope gives lambda = {back:.10g}.",
+    )
+
+
+@claim(
+    "local-series",
+    "section 4.2, (4.24)",
+    "psi ~ c s, tau ~ 1 + c^2 s^2/(6 lambda) and tau' ~ c^2 s/(3 lambda) near s = 0.",
+)
+def local_series() -> Finding:
+    """psi/s, (tau - 1)/s^2 and tau'/s of the exact solution at small s, over what is printed."""
+    exact = hot_solution(1.0)
+    P = 1e-3 * exact.P_b * np.array([0.999, 1.0, 1.001])
+    s, tau = np.exp(exact.log_s(P)), exact.tau(P)
+    square = exact.c**2 / exact.lambda_
+    ratios = {
+        "psi": float(exact.psi(P)[1] / (exact.c * s[1])),
+        "tau - 1": float((tau[1] - 1.0) / (square * s[1] ** 2 / 6.0)),
+        "tau'": float((tau[2] - tau[0]) / (s[2] - s[0]) / (square * s[1] / 3.0)),
+    }
+    return decide(
+        1.0,
+        ratios,
+        holds=all(close(value, 1.0, 1e-5) for value in ratios.values()),
+        reason=f"Ratios to the printed terms in the exact solution for lambda = 1, at s = {s[1]:.2g}.",
     )
 
 

@@ -237,6 +237,34 @@ def _traction_factor(big_a: float) -> float:
 
 
 @claim(
+    "slip-velocity",
+    "section 3.1, (3.15)-(3.16)",
+    "The slip velocity at the base is u_s = -F1 sqrt(T), with F1 as in (3.16).",
+)
+def slip_velocity() -> Finding:
+    """F1 as printed, and the slip that balances (3.11) with the tensors of (2.13) and a differentiated velocity."""
+    printed, computed, own = {}, {}, []
+    k = kappa(ROUGHNESS)
+    for name, flow in named_flows().items():
+        nu, T = flow.base_volume_fraction, flow.base_temperature
+        g = closures(np.array([nu]), E)
+        g1, g2, g0 = nu * g.compressibility[0], g.viscosity[0], g.radial[0]
+        big_a = 1.0 + WALL_CONTACT * (1.0 + 5.0 / (8.0 * nu * g0))
+        printed[name] = float(SLOPE / k * (math.sqrt(math.pi / 2.0) + (k - 0.5 * big_a * ROUGHNESS**2) * g1 / g2))
+        shear = profile_slope(flow, "velocity", 0.0, 0.5 * flow.centre_of_mass)(np.zeros(1))[0]
+        # M_x = -tan(theta) g1 T, over sqrt(2/pi) g1 sqrt(T)
+        u_s = -(math.sqrt(0.5 * math.pi * T) * SLOPE + _traction_factor(big_a) * shear) / k
+        computed[name] = float(-u_s / math.sqrt(T))
+        own.append(close(flow.slip_velocity / math.sqrt(T), printed[name], 1e-9))
+    return decide(
+        printed,
+        computed,
+        holds=all(close(computed[name], printed[name], 1e-6) for name in printed) and all(own),
+        reason="F1 by (3.16), and -u_s/sqrt(T) from the balance of momentum (3.11) at the bases of figure 2.",
+    )
+
+
+@claim(
     "base-energy",
     "section 3.1, (3.17)-(3.18)",
     "The energy balance q = M_x u_s - D at the base is (3.17) with F2 as in (3.18).",

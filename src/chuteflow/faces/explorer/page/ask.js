@@ -1,7 +1,30 @@
-// Questions to the server. One at a time of each kind is under way; of those that wait, only the last is asked.
+// Questions to the server.
 
+/** The answer to a question; `signal` takes it back, which the server notices. */
+export async function ask(question, query, signal) {
+  for (;;) {
+    let answer, status;
+    try {
+      const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal });
+      status = response.status;
+      answer = await response.json();
+    } catch (trouble) {
+      if (signal?.aborted) throw trouble;
+      return { error: "the server does not answer: is chuteflow explore still running?" };
+    }
+    if (status !== 503) return answer;
+    await new Promise((wake) => { setTimeout(wake, 300); });
+  }
+}
+
+/** One question of a kind is under way at a time; of those that come meanwhile, only the last is asked. */
 export class Latest {
-  constructor(question, answered) { this.question = question; this.answered = answered; this.busy = false; this.next = null; }
+  constructor(question, answered) {
+    this.question = question;
+    this.answered = answered;
+    this.busy = false;
+    this.next = null;
+  }
 
   ask(query, mark) {
     this.next = { query, mark };
@@ -13,20 +36,32 @@ export class Latest {
     while (this.next) {
       const { query, mark } = this.next;
       this.next = null;
-      let answer;
-      try {
-        const response = await fetch(`ask/${this.question}?${new URLSearchParams(query)}`);
-        answer = await response.json();
-        if (response.status === 503) {
-          await new Promise((wake) => setTimeout(wake, 300));
-          this.next ??= { query, mark };
-          continue;
-        }
-      } catch {
-        answer = { error: "the server does not answer: is chuteflow explore still running?" };
-      }
-      this.answered(answer, query, mark);
+      this.answered(await ask(this.question, query), query, mark);
     }
     this.busy = false;
+  }
+}
+
+/** Work for when the sliders rest: `start` (signal) is called a while after the last `begin`, which ends earlier work. */
+export class AtRest {
+  constructor(rest, start) {
+    this.rest = rest;
+    this.start = start;
+    this.due = null;
+    this.control = new AbortController();
+  }
+
+  begin() {
+    this.stop();
+    this.due = setTimeout(() => {
+      const { signal } = this.control;
+      this.start(signal).catch((trouble) => { if (!signal.aborted) throw trouble; });
+    }, this.rest);
+  }
+
+  stop() {
+    clearTimeout(this.due);
+    this.control.abort();
+    this.control = new AbortController();
   }
 }

@@ -1,79 +1,140 @@
-// A drawing of the selected flow: grains placed by the volume fraction, carried by the velocity, shaken by the temperature.
+// A drawing of the chosen flow: grains placed by the volume fraction, carried by the velocity, shaken by the temperature.
+import { byId, colour, download, sizeOf } from "./page.js";
 
-const canvas = document.getElementById("chute");
-const key = document.getElementById("chute-key");
+const canvas = byId("chute"), key = byId("chute-key"), pause = byId("pause");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
-let flow = null, grains = [], view = null, running = true, last = 0;
+// Grains: at the least so that one sees a flow, at the most so that they can move; their radii in pixels.
+const fewest = 25, most = 1500, smallest = 1.5, largest = 12;
+let view = null, grains = [], running = !still.matches, last = 0;
 
-function at(list, z, height) {
-  const step = z[1] - z[0], i = Math.min(z.length - 2, Math.max(0, Math.floor(height / step)));
-  const w = Math.min(1, Math.max(0, height / step - i));
-  return list[i] * (1 - w) + list[i + 1] * w;
+/** Value of a field at a height, between its points. */
+function at(field, z, height) {
+  let low = 0, high = z.length - 1;
+  while (high - low > 1) { const middle = (low + high) >> 1; if (z[middle] <= height) low = middle; else high = middle; }
+  const w = Math.min(1, Math.max(0, (height - z[low]) / (z[high] - z[low] || 1)));
+  return field[low] * (1 - w) + field[high] * w;
 }
 
-export function show(chosen, slope, colour) {
-  flow = chosen && { ...chosen.profile, slope, colour, M: chosen.M };
-  const box = canvas.getBoundingClientRect(), ratio = devicePixelRatio || 1;
-  canvas.width = Math.max(1, Math.round(box.width * ratio)); canvas.height = Math.max(1, Math.round(box.height * ratio));
-  if (!flow) { grains = []; key.textContent = "No flow, no grains."; paint(0); return; }
-  const angle = Math.atan(slope), top = flow.z.at(-1);
-  // Room for the chute's fall across the picture, and for the flow above it.
-  const fall = box.width * Math.sin(angle), pixel = Math.max(40, box.height - Math.min(fall, 0.55 * box.height) - 12) / top;
-  const radius = Math.min(12, Math.max(1.5, pixel / 2)), length = box.width / pixel / Math.cos(angle);
-  const exact = (4 / Math.PI) * flow.M * length, count = Math.round(Math.min(1200, Math.max(25, exact)));
-  const fastest = Math.max(...flow.u);
-  view = { angle, top, pixel, radius, length, ratio, width: box.width, height: box.height, pace: (0.25 * length) / Math.max(fastest, 1e-9) };
-  const sum = [0];
-  for (let i = 1; i < flow.z.length; i++) sum.push(sum[i - 1] + (flow.nu[i] + flow.nu[i - 1]) / 2);
-  while (grains.length > count) grains.pop();
-  while (grains.length < count) grains.push({ share: Math.random(), x: Math.random(), dx: 0, dz: 0 });
-  for (const grain of grains) {
-    const target = grain.share * sum.at(-1);
-    let low = 0, high = sum.length - 1;
-    while (high - low > 1) { const middle = (low + high) >> 1; if (sum[middle] <= target) low = middle; else high = middle; }
-    grain.z = (low + (target - sum[low]) / (sum[high] - sum[low] || 1)) * (flow.z[1] - flow.z[0]);
-    grain.u = at(flow.u, flow.z, grain.z); grain.root = Math.sqrt(Math.max(0, at(flow.T, flow.z, grain.z)));
+/** The i-th grain: its share of the mass below, and its place along the chute, both evenly spread. */
+const placed = (i) => ({ share: (0.5 + i * 0.7548776662466927) % 1, x: (0.5 + i * 0.5698402909980532) % 1, dx: 0, dz: 0 });
+
+/** Show a flow, or none, on its slope. */
+export function show(flow, slope, ink) {
+  const box = sizeOf(canvas), ratio = devicePixelRatio || 1;
+  const [width, height] = [box.width, box.height].map((side) => Math.max(1, Math.round(side * ratio)));
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  if (!flow) {
+    view = null;
+    key.textContent = "No flow, no grains.";
+    paint(0);
+    return;
   }
-  const size = pixel / 2 < 1.5 ? "grains drawn larger than they are" : pixel / 2 > 12 ? "grains drawn smaller than they are" : "grains to scale";
-  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${count !== Math.round(exact) ? ", their number not" : ""}.`;
+  const { z, nu, T, u } = flow.profile, angle = Math.atan(slope), top = Math.min(2.5 * flow.h, z.at(-1));
+  // Room for the chute's fall across the picture, and for the flow above it.
+  const fall = Math.min(box.width * slope, 0.5 * box.height), pixel = Math.max(8, box.height - fall - 24) / top;
+  const radius = Math.min(largest, Math.max(smallest, pixel / 2)), length = (box.width / Math.cos(angle) + 2 * radius) / pixel + top * slope;
+  const mass = [0], inside = z.filter((height) => height <= top * 1.000001);
+  for (let i = 1; i < inside.length; i++) mass.push(mass[i - 1] + ((nu[i] + nu[i - 1]) / 2) * (z[i] - z[i - 1]));
+  // So many discs that the share of the picture which they cover is the volume fraction, whatever their size.
+  const exact = (mass.at(-1) * length * pixel ** 2) / (Math.PI * radius ** 2), count = Math.round(Math.min(most, Math.max(fewest, exact)));
+  view = { slope, angle, top, pixel, radius, length, ratio, ink, width: box.width, height: box.height, start: box.height - 10 - fall };
+  view.pace = (0.25 * length) / Math.max(...u.slice(0, inside.length), 1e-9);
+  while (grains.length > count) grains.pop();
+  while (grains.length < count) grains.push(placed(grains.length));
+  for (const grain of grains) {
+    grain.z = at(inside, mass, grain.share * mass.at(-1));
+    grain.u = at(u, z, grain.z);
+    grain.root = Math.sqrt(Math.max(0, at(T, z, grain.z)));
+  }
+  const size = pixel / 2 < smallest ? "grains drawn larger than they are" : pixel / 2 > largest ? "grains drawn smaller than they are" : "grains to scale";
+  const number = count === Math.round(exact) ? "" : count < exact ? ", fewer than should be" : ", more than should be";
+  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${number}. They cover as much as the volume fraction says, move by the velocity and jitter by the temperature.`;
   paint(0);
 }
 
-function normal() { return Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random()); }
+const normal = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
+
+/** Carry each grain for `dt` seconds, and shake it about its place. */
+function move(dt) {
+  const step = dt * view.pace, keep = Math.exp(-4 * dt), spread = Math.min(1.5, 0.15 * view.top), kick = 0.6 * Math.sqrt(step);
+  for (const grain of grains) {
+    grain.x = (grain.x + (grain.u * step) / view.length) % 1;
+    const shaken = (d) => Math.min(spread, Math.max(-spread, keep * d + kick * grain.root * normal()));
+    grain.dx = shaken(grain.dx);
+    grain.dz = shaken(grain.dz);
+  }
+}
+
+/** Where grains are drawn, in pixels along the chute and above it. */
+function* places() {
+  const { length, pixel, radius, top, slope } = view, lean = top * slope;
+  for (const grain of grains) yield [(grain.x * length - lean + grain.dx) * pixel - radius, Math.abs(grain.z + grain.dz) * pixel + radius];
+}
+
+/** Grains of the base, half sunk. */
+function* base() {
+  const step = Math.max(2 * view.radius, 4);
+  for (let x = 0; x < view.width / Math.cos(view.angle) + step; x += step) yield x;
+}
 
 function paint(dt) {
   const pen = canvas.getContext("2d");
   pen.setTransform(1, 0, 0, 1, 0, 0);
   pen.clearRect(0, 0, canvas.width, canvas.height);
-  if (!flow) return;
-  const { angle, pixel, radius, length, ratio, pace, top } = view, style = getComputedStyle(document.documentElement);
+  if (!view) return;
+  if (dt) move(dt);
+  const { ratio, start, angle, width, radius, ink } = view;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.translate(0, Math.max(8, view.height - 8 - Math.min(view.width * Math.tan(angle), 0.6 * view.height)));
+  pen.translate(0, start);
   pen.rotate(angle);
-  pen.strokeStyle = style.getPropertyValue("--quiet"); pen.lineWidth = 3;
-  pen.beginPath(); pen.moveTo(-50, 3); pen.lineTo(view.width * 2, 3); pen.stroke();
-  pen.fillStyle = flow.colour;
-  const step = dt * pace, spread = Math.min(1.5, 0.15 * top);
-  for (const grain of grains) {
-    if (step) {
-      grain.x = (grain.x + (grain.u * step) / length) % 1;
-      const kick = grain.root * Math.sqrt(step) * 0.6, keep = Math.exp(-4 * dt);
-      grain.dx = keep * grain.dx + kick * normal(); grain.dz = Math.min(spread, Math.max(-spread, keep * grain.dz + kick * normal()));
-    }
-    const x = (grain.x * length * 1.15 + grain.dx) * pixel - 0.1 * view.width, z = Math.abs(grain.z + grain.dz) * pixel + radius;
-    pen.beginPath(); pen.arc(x, -z, radius, 0, 7); pen.fill();
-  }
+  pen.fillStyle = colour("--quiet");
+  for (const x of base()) { pen.beginPath(); pen.arc(x, 0, radius, 0, 7); pen.fill(); }
+  pen.fillStyle = colour("--rule");
+  pen.fillRect(-width, 0, 4 * width, 4 * width);
+  pen.fillStyle = ink;
+  for (const [x, y] of places()) { pen.beginPath(); pen.arc(x, -y, radius, 0, 7); pen.fill(); }
+}
+
+/** The picture as SVG. */
+function asSvg() {
+  const { width, height, start, angle, radius, ink } = view, round = (v) => v.toFixed(2);
+  const disc = (x, y) => `<circle cx="${round(x)}" cy="${round(y)}" r="${round(radius)}"/>`;
+  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${round(width)} ${round(height)}" width="${round(width)}" height="${round(height)}">
+<title>${key.textContent}</title><rect width="100%" height="100%" fill="${colour("--panel")}"/>
+<g transform="translate(0 ${round(start)}) rotate(${round((angle * 180) / Math.PI)})"><g fill="${colour("--quiet")}">${[...base()].map((x) => disc(x, 0)).join("")}</g>
+<rect x="${-width}" y="0" width="${4 * width}" height="${4 * width}" fill="${colour("--rule")}"/><g fill="${ink}">${[...places()].map(([x, y]) => disc(x, -y)).join("")}</g></g></svg>\n`;
+}
+
+/** The picture as it stands, as a file: "png" or "svg". */
+export async function save(kind) {
+  if (!view) return;
+  const name = `chuteflow-chute.${kind}`;
+  if (kind === "svg") { download(name, new Blob([asSvg()], { type: "image/svg+xml" })); return; }
+  const copy = document.createElement("canvas"), pen = copy.getContext("2d");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  pen.fillStyle = colour("--panel");
+  pen.fillRect(0, 0, copy.width, copy.height);
+  pen.drawImage(canvas, 0, 0);
+  download(name, await new Promise((made) => { copy.toBlob(made, "image/png"); }));
 }
 
 function frame(now) {
   const dt = Math.min(0.05, (now - last) / 1000);
   last = now;
-  if (running && !still.matches && flow && !document.hidden) paint(dt);
+  if (!running) return;
+  if (view && !document.hidden) paint(dt);
   requestAnimationFrame(frame);
 }
-requestAnimationFrame(frame);
 
-document.getElementById("pause").addEventListener("click", (event) => {
-  running = !running;
-  event.target.textContent = running ? "pause" : "play";
-});
+function run(on) {
+  const starts = on && !running;
+  running = on;
+  pause.textContent = running ? "pause" : "play";
+  if (starts) requestAnimationFrame(frame);
+}
+
+pause.addEventListener("click", () => run(!running));
+// Who asks for less motion gets a still picture, and may start it.
+still.addEventListener("change", () => run(!still.matches));
+run(running);
+if (running) requestAnimationFrame(frame);

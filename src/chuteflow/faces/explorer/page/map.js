@@ -1,85 +1,191 @@
-// The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair.
-import { Latest } from "./ask.js";
+// The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair to drag.
+import { ask, AtRest } from "./ask.js";
 import { draw } from "./chart.js";
+import { byId, colour } from "./page.js";
 import { chute, state } from "./state.js";
 
-const canvas = document.getElementById("map"), over = document.getElementById("map-over"), key = document.getElementById("map-key");
-const names = ["slope", "e", "ew", "roughness"], choose = { x: document.getElementById("map-x"), y: document.getElementById("map-y") };
-let about = null, set = null, answer = null, view = null, holding = false, due = null;
+const svg = byId("map"), key = byId("map-key"), selects = { x: byId("map-x"), y: byId("map-y") };
+const names = ["slope", "e", "ew", "roughness"];
+// From this on, numbers are not told apart.
+const many = 6;
+const capped = (count) => Math.min(count, many), countName = (count) => (count === many ? `${many} or more` : count);
+// What a chute is shaded by: its words, which of its values are told apart, and how they are called.
+const shadings = {
+  most: { label: "flows at one flux", says: "At most this many flows share one flux", value: capped, name: countName },
+  families: { label: "families", says: "Families of flows that do not connect", value: capped, name: countName },
+  density: { label: "density", says: "Densities among the flows", value: (bits) => bits, name: (bits) => ["no flow", "monotonic", "inverted", "both"][bits] },
+  interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
+};
+const shading = () => (shadings[state.shade] ? state.shade : "most");
+// Columns to begin with, and how narrow the stretches between columns may become.
+const first = 8, finest = 64;
+let about = null, set = null, failure = "", shown = null, holding = false;
+// What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
+let wanted = {}, columns = [], whole = false, drawn = null;
 
-const asked = new Latest("map", (given) => {
-  if (given.error) { key.textContent = given.error; return; }
-  answer = given;
-  redraw();
-});
-
+/** `given` is what the server says about itself; `setter` (parts, event) changes the state. */
 export function begin(given, setter) {
-  about = given; set = setter;
-  for (const [axis, select] of Object.entries(choose)) {
-    for (const name of names) select.append(new Option(about.controls[name].label, name));
+  about = given;
+  set = setter;
+  for (const [axis, select] of Object.entries(selects)) {
+    for (const name of names) select.append(new Option(about.controls[name].label.toLowerCase(), name));
     select.addEventListener("change", (event) => {
       const other = axis === "x" ? "y" : "x", swap = state[other] === event.target.value ? { [other]: state[axis] } : {};
       set({ [axis]: event.target.value, ...swap }, event);
     });
   }
-  ask();
+  for (const [name, { label }] of Object.entries(shadings)) byId("shade").append(new Option(label, name));
+  byId("shade").addEventListener("change", (event) => set({ shade: event.target.value }, event));
+  changed(() => true);
 }
 
-/** A new map is needed where anything but the cross-hair moved. */
-export function changed(names_) {
-  const moved = ["e", "ew", "slope", "roughness", "surface", "closure"].some((name) => names_.has(name) && name !== state.x && name !== state.y);
-  if (moved || names_.has("x") || names_.has("y")) ask();
+/** After a change of the state: a new map where anything but the cross-hair moved. */
+export function changed(has) {
+  for (const axis of ["x", "y"]) selects[axis].value = state[axis];
+  byId("shade").value = shading();
+  // A cross-hair that moves asks nothing: one map serves all of its positions.
+  const moved = has("x", "y", "surface", "closure") || names.some((name) => has(name) && name !== state.x && name !== state.y);
+  if (moved || has("shade")) asking.begin();
+  if (has("shade")) drawn = null;
+  if (!shown || moved || has("shade", "theme")) redraw(); else placeHair();
+}
+
+const asking = new AtRest(150, async (signal) => {
+  const { x, y } = state, held = Object.entries(chute()).filter(([name]) => name !== x && name !== y);
+  const query = { ...Object.fromEntries(held), x, y };
+  const known = JSON.stringify(query) === JSON.stringify(wanted) ? columns : [];
+  let places = known.length ? narrower(known) : Array.from({ length: first + 1 }, (_, i) => i / first);
+  while (places.length) {
+    for (const place of places) {
+      const column = await ask("map", { ...query, place }, signal);
+      signal.throwIfAborted();
+      failure = column.error ?? "";
+      if (failure) { redraw(); return; }
+      known.push({ ...column, place });
+      known.sort((a, b) => a.place - b.place);
+      if (known.length > first) take(query, known, false);
+    }
+    places = narrower(known);
+  }
+  take(query, known, true);
+});
+
+function take(query, found, all) {
+  wanted = query;
+  columns = found;
+  whole = all;
+  drawn = null;
   redraw();
 }
 
-function ask() {
-  for (const axis of ["x", "y"]) choose[axis].value = state[axis];
-  clearTimeout(due);
-  // A cross-hair that moves asks nothing, so that the map is drawn once for all of its positions.
-  due = setTimeout(() => {
-    const held = Object.fromEntries(Object.entries(chute()).filter(([name]) => name !== state.x && name !== state.y));
-    asked.ask({ ...held, x: state.x, y: state.y });
-  }, 150);
+/** A column by what is shown alone: its stops, and between them the value that is shaded and whether it is hot. */
+function shownOf(column) {
+  const by = column.names.indexOf(shading()), hot = column.names.indexOf("hot"), stops = [], classes = [];
+  column.codes.forEach((code, k) => {
+    const here = { value: shadings[shading()].value(code[by]), hot: code[hot] > 0 }, last = classes.at(-1);
+    if (last && last.value === here.value && last.hot === here.hot) return;
+    if (k) stops.push(column.stops[k - 1]);
+    classes.push(here);
+  });
+  return { at: column.at, stops, classes };
 }
 
-const shade = (count, dark) => {
-  const light = ["#ffffff", "#d6e4f2", "#9cc3e6", "#4f8fc8", "#1c5a96", "#0b3360"], night = ["#14161a", "#1d3a5c", "#2c6199", "#4f92d1", "#93c2ef", "#d9ecff"];
-  return (dark ? night : light)[Math.min(count, 5)];
-};
+const same = (a, b) => a.value === b.value && a.hot === b.hot;
+const alike = (a, b) => a.classes.length === b.classes.length && a.classes.every((one, k) => same(one, b.classes[k]));
 
+/** Where the stops of two columns are half-way between them: those that correspond, from either end, meet there. */
+function middles(a, b) {
+  const [n, m] = [a.stops.length, b.stops.length], ends = [[...a.stops], [...b.stops]];
+  const meet = (i, j) => { ends[0][i] = ends[1][j] = (a.stops[i] + b.stops[j]) / 2; };
+  let low = 0, high = 0;
+  while (low < Math.min(n, m) && same(a.classes[low], b.classes[low]) && same(a.classes[low + 1], b.classes[low + 1])) { meet(low, low); low++; }
+  while (high < Math.min(n, m) - low && same(a.classes[n - high], b.classes[m - high]) && same(a.classes[n - high - 1], b.classes[m - high - 1])) { high++; meet(n - high, m - high); }
+  // The others stay where they are, as far as those that meet let them.
+  for (const stops of ends) for (let k = low; k < stops.length - high; k++) {
+    stops[k] = Math.max(stops[k], low ? stops[low - 1] : -Infinity);
+    if (high) stops[k] = Math.min(stops[k], stops[stops.length - high]);
+  }
+  return ends;
+}
+
+/** Middles of the stretches between columns whose classes do not follow from one another. */
+function narrower(found) {
+  const seen = found.map(shownOf), places = [];
+  for (let i = 1; i < found.length; i++) {
+    const width = found[i].place - found[i - 1].place, follows = alike(seen[i - 1], seen[i]);
+    if (width > 1.5 / finest && (!follows || (width > 1.5 / (4 * first) && seen[i].stops.length))) places.push((found[i - 1].place + found[i].place) / 2);
+  }
+  return places;
+}
+
+/** Areas of one value, and lines between hot and not, in the coordinates of the map. */
+function pieces(found, x) {
+  const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
+  const at = (o, i) => (outer === x ? [o, i] : [i, o]);
+  const slab = (from, to, left, right, classes) => {
+    const [start, end] = [left, right].map((stops) => [low, ...stops, high]);
+    classes.forEach(({ value, hot }, k) => {
+      if (!areas.has(value)) areas.set(value, []);
+      areas.get(value).push([at(from, start[k]), at(to, end[k]), at(to, end[k + 1]), at(from, start[k + 1])]);
+      if (k && hot !== classes[k - 1].hot) lines.push([at(from, start[k]), at(to, end[k])]);
+    });
+  };
+  const seen = found.map(shownOf);
+  for (let i = 1; i < seen.length; i++) {
+    const [a, b] = [seen[i - 1], seen[i]], middle = (a.at + b.at) / 2, [left, right] = middles(a, b);
+    slab(a.at, middle, a.stops, left, a.classes);
+    slab(middle, b.at, right, b.stops, b.classes);
+  }
+  return { areas, lines };
+}
+
+/** Only the cross-hair moves while it is dragged; the map stays. */
+function placeHair() {
+  const { sx, sy, box } = shown, x = sx(Number(state[state.x])).toFixed(1), y = sy(Number(state[state.y])).toFixed(1);
+  byId("map-hair").setAttribute("d", `M${x} ${box.t}V${box.b}M${box.l} ${y}H${box.r}`);
+  for (const [name, value] of [["cx", x], ["cy", y]]) byId("map-here").setAttribute(name, value);
+  const [across, up] = [state.x, state.y].map((name) => `${about.controls[name].label} ${state[name]}`);
+  svg.setAttribute("aria-label", `Map of chutes, cross-hair at ${across}, ${up}: move it with the arrow keys`);
+}
+
+/** Draw the map as far as it is known. */
 export function redraw() {
-  if (!answer || answer.x.name !== state.x || answer.y.name !== state.y) return;
-  const { x, y, most, boundaries } = answer;
-  const axis = ({ name, values }) => ({ low: values[0], high: values.at(-1), label: `${about.controls[name].label.toLowerCase()} ${about.controls[name].symbol}` });
-  const ink = getComputedStyle(document.documentElement).getPropertyValue("--curve");
-  view = draw(over, { x: axis(x), y: axis(y), lines: boundaries.map((line) => ({ points: line.points, colour: ink, dash: line.dashed ? "5 4" : "" })) });
-  const { box, sx, sy } = view, dark = getComputedStyle(document.documentElement).colorScheme === "dark";
-  canvas.style.left = `${box.l}px`; canvas.style.top = `${box.t}px`;
-  canvas.style.width = `${box.r - box.l}px`; canvas.style.height = `${box.b - box.t}px`;
-  canvas.width = x.values.length; canvas.height = y.values.length;
-  const pen = canvas.getContext("2d");
-  most.forEach((row, j) => row.forEach((count, i) => { pen.fillStyle = shade(count, dark); pen.fillRect(i, y.values.length - 1 - j, 1, 1); }));
-  const px = sx(Number(state[x.name])), py = sy(Number(state[y.name]));
-  over.insertAdjacentHTML("beforeend", `<path class="hair" d="M${px} ${box.t}V${box.b}M${box.l} ${py}H${box.r}"/><circle cx="${px}" cy="${py}" r="5" class="special"/>`);
-  over.setAttribute("aria-label", `Cross-hair at ${x.name} ${state[x.name]}, ${y.name} ${state[y.name]}: move it with the arrow keys`);
-  const counts = [...new Set(most.flat())].sort((a, b) => a - b);
-  key.innerHTML = `At most this many flows share one flux: ${counts.map((n) => `<span data-count="${n}"></span>${n}`).join("")}. Lines: ${answer.says}`;
-  key.querySelectorAll("span").forEach((span) => { span.style.background = shade(Number(span.dataset.count), dark); });
+  const current = columns.length && wanted.x === state.x && wanted.y === state.y;
+  if (current) drawn ??= pieces(columns, state.x);
+  const axis = (name) => {
+    const { low, high, label, symbol } = about.controls[name];
+    return { low, high, label: `${label.toLowerCase()} ${symbol.replace("_w", "w")}` };
+  };
+  const { says, name } = shadings[shading()], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
+  const shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
+  shown = draw(svg, {
+    x: axis(state.x), y: axis(state.y),
+    areas: values.map((value) => ({ rings: drawn.areas.get(value), colour: shade(value) })),
+    lines: current ? drawn.lines.map((points) => ({ points, colour: colour("--curve") })) : [],
+  });
+  svg.classList.toggle("waiting", !current || !whole);
+  svg.insertAdjacentHTML("beforeend", `<path id="map-hair" class="hair"/><circle id="map-here" class="special" r="4.5"><title>this chute</title></circle>`);
+  const legend = values.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
+  key.innerHTML = current ? `${says}: ${legend.join(" ")}. Line: on one side of it there are flows at every high temperature. Drag the cross-hair to another chute.` : "";
+  placeHair();
+  key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
 }
 
 function move(event) {
-  if (!view) return;
-  const box = over.getBoundingClientRect(), inside = (v, { values }) => Number(Math.min(values.at(-1), Math.max(values[0], v)).toPrecision(4));
-  set({ [answer.x.name]: inside(view.sx.inverse(event.clientX - box.left), answer.x), [answer.y.name]: inside(view.sy.inverse(event.clientY - box.top), answer.y) }, event);
+  const box = svg.getBoundingClientRect();
+  const inside = (value, name) => Number(Math.min(about.controls[name].high, Math.max(about.controls[name].low, value)).toPrecision(4));
+  set({
+    [state.x]: inside(shown.sx.inverse(event.clientX - box.left), state.x), [state.y]: inside(shown.sy.inverse(event.clientY - box.top), state.y),
+  }, event);
 }
 
-over.addEventListener("pointerdown", (event) => { holding = true; over.setPointerCapture(event.pointerId); move(event); });
-over.addEventListener("pointermove", (event) => { if (holding) move(event); });
-for (const end of ["pointerup", "pointercancel"]) over.addEventListener(end, () => { holding = false; });
-over.addEventListener("keydown", (event) => {
+svg.addEventListener("pointerdown", (event) => { holding = true; svg.setPointerCapture(event.pointerId); move(event); });
+svg.addEventListener("pointermove", (event) => { if (holding) move(event); });
+for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { holding = false; });
+svg.addEventListener("keydown", (event) => {
   const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[event.key];
-  if (!turn || !answer) return;
+  if (!turn) return;
   event.preventDefault();
-  const { name, values } = answer[turn[0]], step = (values.at(-1) - values[0]) / 100;
-  set({ [name]: Number(Math.min(values.at(-1), Math.max(values[0], Number(state[name]) + turn[1] * step)).toPrecision(4)) }, event);
+  const name = state[turn[0]], { low, high } = about.controls[name], value = Number(state[name]) + (turn[1] * (high - low)) / 200;
+  set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) }, event);
 });

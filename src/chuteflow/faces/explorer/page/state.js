@@ -1,15 +1,22 @@
 // The state of the page is its address: whoever opens a copied address sees the same.
 
 const listeners = [];
-const defaults = { si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", x: "slope", y: "roughness" };
+const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
+const defaults = {
+  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", x: "slope", y: "roughness", shade: "most",
+};
+let first = {}, due = null;
 export const state = {};
-let due = null;
 
-/** Take the state of the address, over the defaults and over `first`. */
-export function start(first) {
-  Object.assign(state, defaults, Object.fromEntries(Object.entries(first).map(([k, v]) => [k, String(v)])));
+/** Take the state of the address, over the defaults and over `preset`. */
+export function start(preset) {
+  first = { ...defaults, ...Object.fromEntries(Object.entries(preset).map(([name, value]) => [name, String(value)])) };
+  Object.assign(state, fromAddress());
+}
+
+function fromAddress() {
   const given = new URLSearchParams(location.search);
-  for (const name of Object.keys(state)) if (given.has(name)) state[name] = given.get(name);
+  return Object.fromEntries(Object.entries(first).map(([name, value]) => [name, given.get(name) ?? value]));
 }
 
 /** Change parts of the state, tell the listeners which, and put it into the address. */
@@ -17,12 +24,15 @@ export function change(parts) {
   const changed = Object.keys(parts).filter((name) => state[name] !== String(parts[name]));
   if (!changed.length) return;
   for (const name of changed) state[name] = String(parts[name]);
-  for (const listen of listeners) listen(new Set(changed));
+  for (const listen of listeners) listen((...names) => names.some((name) => changed.includes(name)));
   // Browsers allow some hundred changes of the address in half a minute: wait until a drag pauses.
   clearTimeout(due);
   due = setTimeout(write, 120);
 }
 
+addEventListener("popstate", () => change(fromAddress()));
+
+/** `listen` is called after each change with a function that tells whether any of some names changed. */
 export function onChange(listen) { listeners.push(listen); }
 
 export function address() {
@@ -30,8 +40,19 @@ export function address() {
   return `${location.pathname}?${new URLSearchParams(shown)}`;
 }
 
-export function write() { clearTimeout(due); history.replaceState(null, "", address()); }
-
-export function chute() {
-  return Object.fromEntries(["slope", "e", "ew", "roughness", "surface", "closure"].map((name) => [name, state[name]]));
+export function write() {
+  clearTimeout(due);
+  history.replaceState(null, "", address());
 }
+
+/** The parameters of the chute, for a question. */
+export const chute = () => Object.fromEntries(material.map((name) => [name, state[name]]));
+
+/** The grains, for a question whose answer has words: SI units are wanted where they are given. */
+export const grains = () => (state.si ? { diameter: String(Number(state.d) / 1000), density: state.rho } : {});
+
+/** Whether the chute itself changed. */
+export const ofChute = (has) => has(...material);
+
+/** Whether what is drawn must be drawn anew though no answer changed. */
+export const ofLooks = (has) => has("si", "d", "rho", "theme");

@@ -12,7 +12,7 @@ export function factor(symbol) {
 
 export function unit(symbol) {
   const name = state.si ? quantities[symbol].unit : "1";
-  return name === "1" ? "" : name;
+  return name === "1" ? "" : name.replaceAll("^2", "²").replaceAll("^3", "³");
 }
 
 export function labelled(text, symbol) {

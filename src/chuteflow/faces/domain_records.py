@@ -1,0 +1,333 @@
+"""Maps of domains as objects, tables and NetCDF, and back.
+
+A file keeps the columns from which a map is read, so that it loads back to the last bit.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chuteflow import __version__
+from chuteflow.analysis.domains import KINDS_OF_BOUNDARIES, Axis, Boundary, Domain, Plane
+from chuteflow.analysis.domains.columns import Column, Part
+from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
+from chuteflow.analysis.ranges import Range
+from chuteflow.errors import InputError
+from chuteflow.faces import contract
+from chuteflow.faces.contract import PARAMETERS
+from chuteflow.faces.records import chute_from, require_format
+from chuteflow.faces.references import PAPER, numbers_are
+
+TITLE = "domains of existence of steady, fully developed flows of grains down a chute"
+KIND, FORMAT = "domain", 1
+#: The short names of parameters, by those of Chute.
+SHORT = {long: short for short, long in PARAMETERS.items()}
+#: More cells than this are not printed with an object.
+MOST_CELLS = 10_000
+_RESTORE = "# restore: "
+#: Numbers of a cell: what they mean, and what their values mean, or the bits of which they are sums.
+CLASSES: dict[str, tuple[str, dict[int, str]]] = {
+    "hot": (
+        "hot, dilute flows by the closed form of section 4",
+        {-1: "not_known_with_interface_conditions", 0: "no_hot_flows", 1: "hot_flows"},
+    ),
+    "exists": ("any flow in the range searched", {0: "no_flow", 1: "flows"}),
+    "most": ("largest number of flows that share one mass flux", {}),
+    "families": ("number of families, connected sets of flows", {}),
+    "hidden": (
+        "hidden families: more than one, so that a continuation from a known flow does not meet all",
+        {0: "none", 1: "hidden_families"},
+    ),
+    "interior": ("kinds of interior among the flows", {bit: name for name, bit in INTERIORS.items()}),
+    "density": ("kinds of density among the flows", {bit: name for name, bit in DENSITIES.items()}),
+}
+#: Those of CLASSES whose values are sums of bits.
+BITS = ("interior", "density")
+
+
+def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]:
+    """What ``chuteflow domain --json`` prints; ``cells`` is null where there are more than ``most_cells``."""
+    plane = found.plane
+    names = [SHORT[plane.x.name], SHORT[plane.y.name]]
+    chute = contract.chute_object(plane.chute)
+    return {
+        "chute": {**chute, **dict.fromkeys(names)},
+        "x": {"name": names[0], "range": [plane.x.low, plane.x.high]},
+        "y": {"name": names[1], "range": [plane.y.low, plane.y.high]},
+        "size": [len(found.x), len(found.y)],
+        "temperatures": list(plane.temperatures),
+        "tolerance": found.tolerance,
+        "classes": {name: _explained(name) for name in CLASSES},
+        "shares": shares(found),
+        "cells": _cells(found) if found.most.size <= most_cells else None,
+        "boundaries": [_boundary(one) for one in found.boundaries],
+        "searched": {
+            "T_surface": list(found.searched.surface_temperature),
+            "M_max": found.searched.largest_holdup,
+        },
+    }
+
+
+def shares(found: Domain) -> dict[str, Any]:
+    """The share of the cells that has each value, number by number; of ``exists_at`` at each temperature."""
+    return {
+        **{name: _shares(getattr(found, name)) for name in CLASSES},
+        "exists_at": [_shares(layer) for layer in found.exists_at],
+    }
+
+
+def _shares(values: np.ndarray) -> dict[str, float]:
+    each, counts = np.unique(values.astype(int), return_counts=True)
+    return {str(value): count / values.size for value, count in zip(each.tolist(), counts.tolist(), strict=True)}
+
+
+def _explained(name: str) -> dict[str, Any]:
+    meaning, values = CLASSES[name]
+    kind = {"bits": values} if name in BITS else {"values": values} if values else {}
+    return {"meaning": meaning, **{key: {str(v): said for v, said in of.items()} for key, of in kind.items()}}
+
+
+def _cells(found: Domain) -> dict[str, Any]:
+    return {
+        "x": found.x.tolist(),
+        "y": found.y.tolist(),
+        **{name: getattr(found, name).astype(int).tolist() for name in CLASSES},
+        "exists_at": found.exists_at.astype(int).tolist(),
+    }
+
+
+def _boundary(one: Boundary) -> dict[str, Any]:
+    return {
+        "kind": one.kind,
+        "meaning": KINDS_OF_BOUNDARIES[one.kind],
+        "values": list(one.values),
+        "temperature": one.temperature,
+        "points": one.points.tolist(),
+    }
+
+
+# What restores a map
+
+
+def _kept(found: Domain) -> dict[str, Any]:
+    plane = found.plane
+    within = plane.within
+    return {
+        "format": FORMAT,
+        "kind": KIND,
+        "chute": contract.chute_object(plane.chute),
+        "axes": [[axis.name, axis.low, axis.high] for axis in (plane.x, plane.y)],
+        "size": [len(found.x), len(found.y)],
+        "temperatures": list(plane.temperatures),
+        "searched": [[within.coldest, within.hottest], within.deepest],
+        "tolerance": found.tolerance,
+        "columns": _columns_kept(found.columns),
+        "hot_columns": _columns_kept(found.hot_columns),
+    }
+
+
+def _columns_kept(columns: Sequence[Column]) -> list[Any]:
+    return [[one.place, [[list(part.stops), list(part.values)] for part in one.parts]] for one in columns]
+
+
+def _restored(kept: Mapping[str, Any]) -> Domain:
+    """The map that was kept.
+
+    Raises:
+        InputError: for a later format, or for what is no map.
+    """
+    require_format(kept)
+    chute = chute_from(dict(kept["chute"]))
+    x, y = (Axis(str(name), float(low), float(high)) for name, low, high in kept["axes"])
+    (low, high), deepest = kept["searched"]
+    within = Range.checked((float(low), float(high)), float(deepest), chute.surface)
+    plane = Plane(x, y, chute, tuple(map(float, kept["temperatures"])), within)
+    size = tuple(int(count) for count in kept["size"])
+    return Domain.on_cells(
+        plane,
+        (size[0], size[1]),
+        float(kept["tolerance"]),
+        _columns_from(kept["columns"]),
+        _columns_from(kept["hot_columns"]),
+    )
+
+
+def _columns_from(kept: Sequence[Any]) -> tuple[Column, ...]:
+    return tuple(
+        Column(float(place), tuple(Part(tuple(map(float, stops)), tuple(map(int, values))) for stops, values in parts))
+        for place, parts in kept
+    )
+
+
+# Files
+
+
+def write(found: Domain, path: Path) -> None:
+    """Write a map to ``path``, .nc, .csv or .json."""
+    {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}[path.suffix.lower()](found, path)
+
+
+def read(path: Path) -> Domain | None:
+    """The map in a file, .nc, .csv or .json; None where it holds something else.
+
+    Raises:
+        InputError: for a later format.
+        OSError, ValueError, KeyError, TypeError: for a file that is damaged.
+    """
+    kept = {".nc": _kept_in_netcdf, ".csv": _kept_in_csv, ".json": _kept_in_json}[path.suffix.lower()](path)
+    return None if kept is None else _restored(kept)
+
+
+def _write_json(found: Domain, path: Path) -> None:
+    whole = domain_object(found, found.most.size) | {"source": f"chuteflow {__version__}", "restore": _kept(found)}
+    path.write_text(contract.text(whole) + "\n", encoding="utf-8")
+
+
+def _kept_in_json(path: Path) -> Any:
+    kept = json.loads(path.read_text(encoding="utf-8"))["restore"]
+    return kept if kept["kind"] == KIND else None
+
+
+def _write_csv(found: Domain, path: Path) -> None:
+    """One row for each cell, row by row from the lowest y, between comment lines."""
+    plane = found.plane
+    layers = {name: getattr(found, name).astype(int).ravel() for name in CLASSES}
+    layers |= {
+        f"exists_at_{temperature:g}": layer.astype(int).ravel()
+        for temperature, layer in zip(plane.temperatures, found.exists_at, strict=True)
+    }
+    y, x = np.meshgrid(found.y, found.x, indexing="ij")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {line}\n" for line in _comments(found))
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow([plane.x.name, plane.y.name, *layers])
+        columns = [x.ravel().tolist(), y.ravel().tolist(), *(layer.tolist() for layer in layers.values())]
+        table.writerows(zip(*columns, strict=True))
+        file.write(_RESTORE + json.dumps(_kept(found), allow_nan=False) + "\n")
+
+
+def _comments(found: Domain) -> Iterator[str]:
+    plane = found.plane
+    yield f"chuteflow {__version__}: {TITLE}"
+    yield "theory: " + PAPER
+    fixed = {k: v for k, v in plane.chute.as_dict().items() if k not in (plane.x.name, plane.y.name)}
+    yield "chute: " + ", ".join(f"{name} = {value}" for name, value in fixed.items())
+    low, high = found.searched.surface_temperature
+    yield f"searched: surface_temperature {low} to {high}, mass_holdup up to {found.searched.largest_holdup}"
+    yield f"tolerance: boundaries are located to {found.tolerance} of each axis"
+    yield numbers_are(None)
+    for name, (meaning, values) in CLASSES.items():
+        said = ", ".join(f"{value} {what}" for value, what in values.items())
+        kind = " (sum of)" if name in BITS else ""
+        yield f"{name}: {meaning}" + (f"{kind}: {said}" if said else "")
+    if plane.temperatures:
+        yield "exists_at_T: 1 where there is a flow at the surface temperature T, else 0"
+
+
+def _kept_in_csv(path: Path) -> Any:
+    with path.open(encoding="utf-8") as file:
+        if TITLE not in next(file, ""):
+            return None
+        heads = [line.removeprefix(_RESTORE) for line in file if line.startswith(_RESTORE)]
+    if len(heads) != 1:
+        raise InputError("it is cut short, or was not written by chuteflow")
+    return json.loads(heads[0])
+
+
+def _write_netcdf(found: Domain, path: Path) -> None:
+    import h5netcdf
+
+    plane = found.plane
+    x, y = plane.x.name, plane.y.name
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    fixed = {name: value for name, value in plane.chute.as_dict().items() if name not in (x, y)}
+    with h5netcdf.File(path, "w") as file:
+        layers = {"temperature": len(plane.temperatures)} if plane.temperatures else {}
+        file.dimensions = {**layers, y: len(found.y), x: len(found.x)}
+        file.attrs.update(
+            {
+                "Conventions": "CF-1.11",
+                "title": TITLE,
+                "source": f"chuteflow {__version__}",
+                "history": f"{now} written by chuteflow {__version__}",
+                "references": PAPER,
+                "comment": numbers_are(None),
+                **fixed,
+                "searched_surface_temperature": np.array(found.searched.surface_temperature),
+                "searched_largest_holdup": found.searched.largest_holdup,
+                "tolerance": found.tolerance,
+                "tolerance_comment": "share of each axis to which boundaries are located",
+            }
+        )
+        for name, values in ((x, found.x), (y, found.y)):
+            _put(file, name, (name,), values, {"units": "1", "long_name": f"{name.replace('_', ' ')} of the chute"})
+        for name in CLASSES:
+            _put(file, name, (y, x), getattr(found, name).astype("i2" if name == "most" else "i1"), _flags(name))
+        if plane.temperatures:
+            attributes = {"units": "1", "long_name": "surface temperature"}
+            _put(file, "temperature", ("temperature",), np.array(plane.temperatures), attributes)
+            attributes = {"long_name": "a flow at the surface temperature", **_two("no_flow", "flow")}
+            _put(file, "exists_at", ("temperature", y, x), found.exists_at.astype("i1"), attributes)
+        _write_boundaries(file.create_group("boundaries"), found)
+        kept = np.frombuffer(json.dumps(_kept(found), allow_nan=False).encode(), dtype="u1")
+        group = file.create_group("restore")
+        group.attrs["long_name"] = "columns, from which chuteflow restores the map to the last bit"
+        group.attrs["kind"] = KIND
+        group.dimensions = {"byte": len(kept)}
+        _put(group, "columns", ("byte",), kept, {})
+
+
+def _flags(name: str) -> dict[str, Any]:
+    meaning, values = CLASSES[name]
+    if not values:
+        return {"long_name": meaning, "units": "1"}
+    numbers = np.array(list(values), dtype="i1")
+    flags = "flag_masks" if name in BITS else "flag_values"
+    return {"long_name": meaning, flags: numbers, "flag_meanings": " ".join(values.values())}
+
+
+def _two(no: str, yes: str) -> dict[str, Any]:
+    return {"flag_values": np.arange(2, dtype="i1"), "flag_meanings": f"{no} {yes}"}
+
+
+def _write_boundaries(group: Any, found: Domain) -> None:
+    """All boundaries, point after point, with the number of the line and its kind."""
+    lines, kinds = found.boundaries, tuple(KINDS_OF_BOUNDARIES)
+    lengths = [len(one.points) for one in lines]
+    points = np.concatenate([np.empty((0, 2)), *(one.points for one in lines)])
+    group.attrs["long_name"] = "boundaries between classes as lines"
+    group.dimensions = {"point": len(points)}
+    for name, values in ((found.plane.x.name, points[:, 0]), (found.plane.y.name, points[:, 1])):
+        _put(group, name, ("point",), values, {"units": "1", "long_name": name.replace("_", " ")})
+    number = np.repeat(np.arange(len(lines), dtype="i4"), lengths)
+    _put(group, "line", ("point",), number, {"units": "1", "long_name": "number of the line"})
+    attributes = {
+        "long_name": "kind of boundary",
+        "flag_values": np.arange(len(kinds), dtype="i1"),
+        "flag_meanings": " ".join(kinds),
+        "comment": "; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS_OF_BOUNDARIES.items()),
+    }
+    kind = np.repeat(np.array([kinds.index(one.kind) for one in lines], dtype="i1"), lengths)
+    _put(group, "kind", ("point",), kind, attributes)
+
+
+def _put(group: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, attributes: dict[str, Any]) -> None:
+    variable = group.create_variable(name, dimensions, values.dtype, data=values)
+    variable.attrs.update(attributes)
+
+
+def _kept_in_netcdf(path: Path) -> Any:
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        group = file.groups["restore"]
+        if group.attrs.get("kind") != KIND:
+            return None
+        return json.loads(bytes(group.variables["columns"][...]))

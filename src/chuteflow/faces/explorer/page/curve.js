@@ -1,0 +1,138 @@
+// The curve of all flows, folds and all: flows at the flux as points to choose, and the curve itself to drag.
+import { draw } from "./chart.js";
+import { fluxWithin } from "./controls.js";
+import { byId, colour, flowColour } from "./page.js";
+import { change, state } from "./state.js";
+import { factor, labelled } from "./units.js";
+
+const svg = byId("curve");
+const names = { h: "centre of mass h", M: "hold-up M", T_surface: "surface temperature" };
+const shapes = { "fold-Q": "circle", "fold-M": "circle", "fold-T": "circle", "density-inversion": "diamond", "interior-change": "triangle" };
+let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null;
+// While the curve is dragged: ln of the quantity where the pointer is.
+let held = null;
+
+/** `setter` (parts, event) changes the state. */
+export function begin(setter) { set = setter; }
+
+export function takeCurve(answer) {
+  curve = answer;
+  byId("count").textContent = curve.says;
+  redraw();
+}
+
+/** The flows at the flux and which of them is chosen; while the curve is dragged, the one at the pointer is. */
+export function takeFlows(list, k) {
+  flows = list;
+  chosen = k;
+  redraw();
+}
+
+/** Part of the curve that holds its folds and the flux, or all of it. */
+function wanted() {
+  const Q = Number(state.Q), name = state.against;
+  const all = curve.branches.flatMap((b) => b.Q.map((q, i) => [q, b[name][i]]));
+  if (!all.length) return null;
+  const folds = curve.branches.flatMap((b) => b.special.filter((s) => s.kind === "fold-Q").map((s) => s.Q));
+  const ends = state.whole ? all.map(([q]) => q) : [...folds.map((q) => q / 2.5), ...folds.map((q) => q * 2.5), Q / 2, Q * 2];
+  const x = { low: Math.min(...ends), high: Math.max(...ends), log: true };
+  const inside = all.filter(([q]) => q >= x.low && q <= x.high), ys = (inside.length ? inside : all).map((p) => p[1]);
+  return { x, y: { low: Math.min(...ys) * 0.9, high: Math.max(...ys) * 1.1, log: true }, name, whole: state.whole };
+}
+
+/** The frame stays as long as it serves, so that the curve moves and not the axes. */
+function settle() {
+  const next = wanted();
+  if (!next) { frame = null; return; }
+  const span = (axis) => Math.log(axis.high / axis.low);
+  const serves = (axis) => next[axis].low >= frame[axis].low && next[axis].high <= frame[axis].high && span(frame[axis]) < 1.6 * span(next[axis]);
+  const same = frame && frame.name === next.name && frame.whole === next.whole;
+  const dragged = same && held !== null && Number(state.Q) >= frame.x.low && Number(state.Q) <= frame.x.high;
+  if (!(dragged || (same && serves("x") && serves("y")))) frame = next;
+}
+
+/** Lines of a branch: one for each stretch whose density is of one kind. */
+function stretches(branch, at) {
+  const lines = [];
+  for (let i = 0; i < branch.Q.length - 1;) {
+    let j = i + 1;
+    while (j < branch.Q.length - 1 && branch.density[j] === branch.density[i]) j++;
+    const points = [];
+    for (let k = i; k <= j; k++) points.push(at(k));
+    lines.push({ points, colour: colour("--curve"), dash: branch.density[i] === "monotonic" ? "7 4" : "" });
+    i = j;
+  }
+  return lines;
+}
+
+export function redraw() {
+  if (!curve) return;
+  settle();
+  if (!frame) {
+    svg.innerHTML = `<text x="12" y="30">No curve: this chute has no flows.</text>`;
+    shown = null;
+    return;
+  }
+  const name = state.against, sq = factor("Q"), sn = factor(name), lines = [], marks = [];
+  const axis = ({ low, high, log }, s, label) => ({ low: low * s, high: high * s, log, label });
+  for (const branch of curve.branches) {
+    lines.push(...stretches(branch, (i) => [branch.Q[i] * sq, branch[name][i] * sn]));
+    for (const s of branch.special) marks.push({ x: s.Q * sq, y: s[name] * sn, shape: shapes[s.kind] ?? "circle", title: curve.kinds[s.kind] ?? s.kind });
+  }
+  (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
+  shown = draw(svg, {
+    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(names[name], name)), lines, marks, hair: Number(state.Q) * sq,
+  });
+  svg.setAttribute("aria-valuenow", String(Number(state.Q) * sq));
+  svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
+  svg.setAttribute("aria-valuemax", String(frame.x.high * sq));
+}
+
+/** The point of the curve that is nearest to the pointer: its flux and the quantity. */
+function nearest(event) {
+  const box = svg.getBoundingClientRect(), px = event.clientX - box.left, py = event.clientY - box.top;
+  const name = state.against, sq = factor("Q"), sn = factor(name);
+  let best = Infinity, found = null;
+  for (const b of curve.branches) for (let i = 1; i < b.Q.length; i++) {
+    const [x0, x1] = [i - 1, i].map((k) => shown.sx(b.Q[k] * sq)), [y0, y1] = [i - 1, i].map((k) => shown.sy(b[name][k] * sn));
+    const along = ((px - x0) * (x1 - x0) + (py - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1);
+    const w = Math.max(0, Math.min(1, along)), off = Math.hypot(px - x0 - w * (x1 - x0), py - y0 - w * (y1 - y0));
+    const between = (list) => list[i - 1] ** (1 - w) * list[i] ** w;
+    if (off < best) { best = off; found = { Q: between(b.Q), value: between(b[name]) }; }
+  }
+  return found;
+}
+
+function moveTo(event) {
+  const point = shown && nearest(event);
+  if (!point) return;
+  held = Math.log(point.value);
+  set({ Q: fluxWithin(point.Q) }, event);
+}
+
+/** Which flow the pointer holds: the nearest of those at the flux, or null where none is held. */
+export function heldFlow(list) {
+  if (held === null || !list.length) return null;
+  const off = list.map((flow) => Math.abs(Math.log(flow[state.against]) - held));
+  return off.indexOf(Math.min(...off));
+}
+
+svg.addEventListener("pointerdown", (event) => {
+  const flow = event.target.dataset?.flow;
+  held = flow === undefined ? 0 : Math.log(flows[flow][state.against]);
+  svg.setPointerCapture(event.pointerId);
+  if (flow === undefined) moveTo(event); else set({ flow }, event);
+});
+svg.addEventListener("pointermove", (event) => { if (held !== null) moveTo(event); });
+for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => {
+  if (held === null) return;
+  const flow = heldFlow(flows ?? []);
+  if (flow !== null) change({ flow });
+  held = null;
+});
+svg.addEventListener("keydown", (event) => {
+  const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+  if (!turn) return;
+  event.preventDefault();
+  set({ Q: fluxWithin(Number(state.Q) * 1.01 ** turn) }, event);
+});

@@ -1,0 +1,261 @@
+"""Flows that change in time, the same all along the chute: z and t, with the laws and the base of the steady ones.
+
+# notation: m mass above a grain (it stays the same: a grain takes its m along), tau = m/nu, S = p/m,
+# G = g1/nu, primes d/dm; M hold-up, s slope; nu' = 1/tau - m tau'/tau^2.
+
+With the mass above for coordinate, d/dz = -nu d/dm, and no grain crosses a node: mass is conserved by
+construction. (2.1)-(2.3) become
+
+    d ln tau/dt = -m w'/tau                          P_zz = m S + (4/3 eta + xi) nu w',   S = G T/tau
+    du/dt = P_xz' + s                                P_xz = eta nu u'
+    dw/dt = P_zz' - 1                                q = nu (K T' - K* nu')
+    (3/2) dT/dt = q' + P_zz w' + P_xz u' - gamma/nu
+
+Stresses and heat flux vanish at m = 0 by themselves, so that the free surface needs no condition (2.16). At the
+base w = 0, and traction and heat flux are Richman's (2.9)-(2.15): the traction is affine in u', which is
+eliminated, so that both follow from u, w' and T there. They enter as the boundary terms of the weak form: on
+Lobatto's nodes, where sums integrate by parts exactly, the energy balance holds then for the discrete equations.
+A steady flow has S = 1, w = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.legendre import LobattoGrid, lobatto
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import stretch_map
+from chuteflow.steady.flow import Flow
+from chuteflow.theory import boundary
+from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients
+from chuteflow.theory.laws import law
+from chuteflow.theory.transport import Grains, Vector, traction
+
+#: Degree of the grid in m.
+DEGREE = 40
+FIELDS = 4
+#: Share of the mass above the highest node, where fields are those of the far field to rounding.
+_SMALLEST = 1e-250
+#: Imaginary step of derivatives, far below rounding.
+_STEP = 1e-40
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies of a state per unit area of the base, in rho_p g d^2 cos theta."""
+
+    kinetic: float
+    thermal: float
+    potential: float
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return self.kinetic + self.thermal + self.potential
+
+
+@dataclass(frozen=True)
+class Power:
+    """Rates of energy per unit area of the base, in rho_p (g d cos theta)^(3/2).
+
+    ``gravity`` is s Q, its work along the slope; ``collisions`` of the grains with each other and with the
+    ``base`` lose energy. Without heat through the surface the total energy changes with what is left of it.
+    """
+
+    gravity: float
+    collisions: float
+    base: float
+
+    @property
+    def net(self) -> float:
+        """What is left for the energy of the flow."""
+        return self.gravity - self.collisions - self.base
+
+
+@dataclass(frozen=True, eq=False)
+class _Forces:
+    """Stresses, heat flux, loss and derivatives at the nodes; those of the base apart."""
+
+    normal: Array
+    shear: Array
+    heat: Array
+    loss: Array
+    u_m: Array
+    w_m: Array
+    base_shear: Array
+    base_heat: Array
+    base_loss: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """The moving grains of one chute and hold-up, discretised: Lobatto's nodes in m, denser at the surface.
+
+    A state is the vector (4 (degree + 1),) of ln tau, u, w and ln T at the nodes, from the surface to the base.
+    Two of its values do not move: tau at m = 0, where there is no mass whose motion could change it, and w at
+    the base.
+    """
+
+    chute: Chute
+    mass_holdup: float
+    stretch: float
+    degree: int = DEGREE
+
+    @classmethod
+    def of(cls, flow: Flow, degree: int = DEGREE) -> Layer:
+        """The layer that ``flow`` is a steady state of.
+
+        Raises:
+            InputError: for the interface, whose conditions know steady flows alone, and for laws that do.
+        """
+        if flow.chute.surface != "free":
+            raise InputError(
+                "the interface is known for steady flows alone: time needs the free surface, give --surface free"
+            )
+        Grains(law(flow.chute.closure), flow.chute.restitution, flow.chute.slope)
+        stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
+        return cls(flow.chute, flow.mass_holdup, stretch, degree)
+
+    @property
+    def _grid(self) -> LobattoGrid:
+        return lobatto(self.degree)
+
+    @cached_property
+    def mass(self) -> Array:
+        """The mass above each node."""
+        return self.mass_holdup * stretch_map(self._grid.nodes, self.stretch)[0]
+
+    @cached_property
+    def weights(self) -> Array:
+        """The mass that each node stands for."""
+        return self._grid.weights * self.mass_holdup * stretch_map(self._grid.nodes, self.stretch)[1]
+
+    @cached_property
+    def _derivative(self) -> Array:
+        rate = stretch_map(self._grid.nodes, self.stretch)[1]
+        return self._grid.derivative / (self.mass_holdup * rate)[:, None]
+
+    def steady(self, flow: Flow) -> Array:
+        """The state that ``flow``, of the same hold-up, is."""
+        profile = flow.at_overburden(np.maximum(self.mass / self.mass_holdup, _SMALLEST))
+        nu, T = profile.volume_fraction, profile.granular_temperature
+        tau = T * self._coefficients(nu).compressibility
+        return np.concatenate([np.log(tau), profile.velocity, np.zeros_like(nu), np.log(T)])
+
+    def rate(self, state: Array) -> Array:
+        """d state/dt; ``state`` may be many (..., 4 (degree + 1))."""
+        log_tau, _, _, log_T = self._fields(state)
+        f, end = self._forces(state), 1.0 / self.weights[-1]
+        fields = np.empty((*state.shape[:-1], FIELDS, self.degree + 1), dtype=state.dtype)
+        fields[..., 0, :] = -self.mass * f.w_m / np.exp(log_tau)
+        fields[..., 1, :] = self._slope(f.shear) + self.chute.slope
+        fields[..., 1, -1] += end * (f.base_shear - f.shear[..., -1])
+        fields[..., 2, :] = self._slope(f.normal) - 1.0
+        fields[..., 2, -1] = 0.0
+        heating = self._slope(f.heat) + f.normal * f.w_m + f.shear * f.u_m - f.loss
+        heating[..., -1] += end * (f.base_heat - f.heat[..., -1])
+        fields[..., 3, :] = heating / (1.5 * np.exp(log_T))
+        return fields.reshape(state.shape)
+
+    def jacobian(self, state: Array) -> Array:
+        """d rate/d state, exact (complex steps)."""
+        stepped: Any = state + _STEP * 1j * np.eye(len(state))
+        return self.rate(stepped).imag.T / _STEP
+
+    def growth_rates(self, state: Array) -> NDArray[np.complex128]:
+        """Growth rates of small disturbances of a steady ``state``, fastest growing first; the mass is given.
+
+        Those of the continuous spectrum, on the negative real axis and at its end 0, move with the degree.
+        """
+        moving = np.ones(len(state), dtype=bool)
+        moving[[0, 3 * (self.degree + 1) - 1]] = False
+        values = np.linalg.eigvals(self.jacobian(state)[np.ix_(moving, moving)]).astype(complex)
+        return values[np.argsort(-np.real(values))]
+
+    def base_density(self, state: Array) -> float:
+        """nu at the base over that of the densest packing."""
+        return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / law(self.chute.closure).densest)
+
+    def numbers(self, state: Array) -> tuple[float, float, float, float]:
+        """Q, h, and T at the surface and at the base."""
+        log_tau, u, _, log_T = self._fields(state)
+        # Int z dm = Int m dz = Int tau dm
+        depth = float(self.weights @ np.exp(log_tau)) / self.mass_holdup
+        return float(self.weights @ u), depth, float(np.exp(log_T[0])), float(np.exp(log_T[-1]))
+
+    def energy(self, state: Array) -> Energy:
+        """Where the energy of a state is."""
+        log_tau, u, w, log_T = self._fields(state)
+        kinetic, thermal, potential = (
+            self.weights @ density for density in (0.5 * (u**2 + w**2), 1.5 * np.exp(log_T), np.exp(log_tau))
+        )
+        return Energy(float(kinetic), float(thermal), float(potential))
+
+    def power(self, state: Array) -> Power:
+        """What changes the energy of a state."""
+        f = self._forces(state)
+        return Power(
+            gravity=self.chute.slope * self.numbers(state)[0],
+            collisions=float(self.weights @ f.loss),
+            base=float(f.base_loss),
+        )
+
+    def _fields(self, state: Array) -> tuple[Array, ...]:
+        """ln tau, u, w and ln T at the nodes."""
+        return tuple(np.moveaxis(state.reshape(*state.shape[:-1], FIELDS, -1), -2, 0))
+
+    def _slope(self, values: Array) -> Array:
+        """d values/dm."""
+        return values @ self._derivative.T
+
+    def _forces(self, state: Array) -> _Forces:
+        log_tau, u, w, log_T = self._fields(state)
+        m = self.mass
+        tau, T, root_T = np.exp(log_tau), np.exp(log_T), np.exp(0.5 * log_T)
+        nu = m / tau
+        g = self._coefficients(nu)
+        u_m, w_m, T_m = self._slope(u), self._slope(w), T * self._slope(log_T)
+        nu_m = (1.0 - m * self._slope(log_tau)) / tau
+        normal = m * g.compressibility * T / tau + (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * root_T * nu * w_m
+        base = self._at_base(nu[..., -1], u[..., -1], -(nu * w_m)[..., -1], T[..., -1], normal[..., -1])
+        return _Forces(
+            normal=normal,
+            shear=g.viscosity * root_T * nu * u_m,
+            heat=nu * root_T * (g.conductivity * T_m - g.density_conductivity * T * nu_m),
+            loss=g.dissipation * nu * root_T * T,
+            u_m=u_m,
+            w_m=w_m,
+            base_shear=base[0],
+            base_heat=base[1],
+            base_loss=base[2],
+        )
+
+    def _coefficients(self, nu: Array) -> Coefficients:
+        chosen = law(self.chute.closure)
+        room = 1.0 - nu / chosen.densest
+        return chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope)
+
+    def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:
+        """P_xz and q at the base, and the energy lost to it, (2.9)-(2.15)."""
+        chute, root_T = self.chute, np.sqrt(T)
+        g = self._coefficients(nu)
+        bumps = 1.0 + WALL_CONTACT * (1.0 + 0.625 / (nu * g.radial))
+
+        def touched(u_z: float) -> Vector:
+            grad_u = ((0.0, 0.0, u_z), (0.0, 0.0, 0.0), (0.0, 0.0, w_z))
+            return traction((-u, 0.0, 0.0), root_T, grad_u, bumps, chute.roughness)
+
+        along, _, up = touched(0.0)
+        strength = normal / up
+        pull = strength * (touched(1.0)[0] - along)  # dM_x/du_z
+        viscosity = g.viscosity * root_T
+        shear = viscosity * strength * along / (viscosity + pull)
+        loss = strength * root_T * boundary.base_loss(chute.wall_restitution, chute.roughness)
+        return shear, -shear * u - loss, loss
