@@ -22,10 +22,11 @@ def tab(served):
     with served() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=QUIET)
         tab = browser.new_context(base_url=address).new_page()
-        tab.troubles, tab.asked = [], []
-        tab.on("pageerror", lambda error: tab.troubles.append(str(error)))
-        tab.on("console", lambda message: tab.troubles.append(message.text) if message.type == "error" else None)
-        tab.on("request", lambda request: tab.asked.append(request.url))
+        troubles, asked = [], []
+        tab.on("pageerror", lambda error: troubles.append(str(error)))
+        tab.on("console", lambda message: troubles.append(message.text) if message.type == "error" else None)
+        tab.on("request", lambda request: asked.append(request.url))
+        vars(tab).update(troubles=troubles, asked=asked)
         yield tab
         browser.close()
 
