@@ -49,8 +49,9 @@ def test_every_page_of_the_start_is_run():
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_no_example_is_passed_over(page):
     languages = re.findall(r"^```([\w-]+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    # A console holds what installs, serves or does not end; the others are shown, not run.
-    assert set(languages) <= {"python", "sh", "output", "console", "text", "toml"}
+    # A console holds what installs, serves or does not end, and py what needs a cluster; with text and toml they are
+    # shown, not run.
+    assert set(languages) <= {"python", "sh", "output", "console", "py", "text", "toml"}
 
 
 def documented_names():
@@ -77,6 +78,9 @@ def names_in(value):
             marks=pytest.mark.slow,
         ),
         "claims --only slip-limit",
+        "stability {chute} --flux 3 --kx 0.01 --ky 0",
+        pytest.param("growth {chute} --flux 3 --kx 0:0.02 --ky 0:0.02 --size 4x4", marks=pytest.mark.slow),
+        pytest.param("neutral {chute} --size 4x4 --search-temperature 1:10", marks=pytest.mark.slow),
         "relax {chute} --flux 3 --duration 1",
     ],
     ids=lambda command: command.split()[0],
