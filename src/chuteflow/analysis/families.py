@@ -85,7 +85,10 @@ def _trace_anew(knots: list[Knot], within: Range, found: list[TracedFamily]) -> 
         solution, ahead = solved(knots, i)
         if solution.converged:
             if not any(family.holds(solution) for family in found):
-                found.append(traced(solution, ahead, within))
+                family = traced(solution, ahead, within)
+                # Of a family that only touches the range there is one flow, at its edge.
+                if len(family.solutions) > 1:
+                    found.append(family)
             return
     raise SolveError("a family seen in the search could not be entered: narrow the range searched")
 

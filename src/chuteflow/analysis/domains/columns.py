@@ -72,6 +72,14 @@ class Column:
 
 def column(place: float, classify: Classify, shares: Iterable[float], tolerance: float) -> Column:
     """The column at ``place``: classified at ``shares`` and at both ends, and halved where the class changes."""
+    stops, codes = halved(place, classify, shares, tolerance)
+    return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
+
+
+def halved(
+    place: float, classify: Classify, shares: Iterable[float], tolerance: float
+) -> tuple[list[float], list[Code]]:
+    """The stops of a column at ``place``, ascending, and the classes between them, one more."""
     points = sorted({0.0, 1.0, *(s for s in shares if 0.0 < s < 1.0)})
     known = [(s, classify(place, s)) for s in points]
     stops: list[float] = []
@@ -91,7 +99,7 @@ def column(place: float, classify: Classify, shares: Iterable[float], tolerance:
 
     for (low, first), (high, last) in itertools.pairwise(known):
         search(low, first, high, last)
-    return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
+    return stops, codes
 
 
 def part(stops: Sequence[float], values: Sequence[int]) -> Part:

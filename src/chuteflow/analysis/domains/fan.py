@@ -188,8 +188,8 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
     floor = min(-_COLD * (balance + rate + 2.0 + square), window[0])
     # In the empty state y rises to this limit, never to fall again: no base is met beyond its own flux.
     limit = math.sqrt(max(2.0 * net[0] * closures[CONDUCTION, 0], 0.0))
-    within_reach = given[given[:, 0] <= limit, 0]
-    ceiling = float(within_reach.max()) if within_reach.size else 0.0
+    emptiest, fullest = float(given[:, 0].min()), float(given[:, 0].max())
+    ceiling = min(fullest, limit) if emptiest <= limit else 0.0
 
     def derivative(state: Array) -> Array:
         p, big_l, y, _ = state
@@ -234,7 +234,7 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
         if left.size and len(order) + left.size <= _MOST_COLUMNS:
             sources, weights = _between(state, order, gaps, left)
             births.append((len(rows) - 1, sources, weights))
-            born = (state[:, sources] * weights).sum(axis=1)
+            born = _mean(state[:, sources], weights)
             fresh = np.arange(len(order), len(order) + left.size)
             gaps[left] *= 0.5
             gaps = np.insert(gaps, left, gaps[left])
@@ -252,7 +252,7 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
     for k, sources, weights in births:
         depth, count = k + len(thin) - top, sources.shape[1]
         history = states[:depth][:, :, sources]  # (depth, 4, 4, births)
-        states[:depth, :, first : first + count] = (history * weights).sum(axis=2)
+        states[:depth, :, first : first + count] = np.moveaxis(_mean(np.moveaxis(history, 1, 0), weights), 0, 1)
         first += count
     return _Grown(states[:, :, order], order, gaps, len(thin), p1)
 
@@ -307,6 +307,11 @@ def _between(
     weights += np.where(np.arange(4)[:, None] - (left - first) == 1, 0.5, 0.0)
     weights[:, near] = lagrange(at[:, near], inner[near] + 0.5)
     return sources, weights
+
+
+def _mean(states: Array, weights: Array) -> Array:
+    """Means of ``states`` (4, ..., 4, n) by ``weights`` (4, n), of the logarithm of p, which is positive."""
+    return np.concatenate([np.exp((np.log(states[:1]) * weights).sum(axis=-2)), (states[1:] * weights).sum(axis=-2)])
 
 
 def lagrange(at: Array, x: Array) -> Array:
@@ -444,7 +449,10 @@ def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
     widths = gaps[first + np.arange(points - 1)[:, None]] / gaps[np.minimum(here, count - 2)]
     at = np.concatenate([np.zeros((1, count)), np.cumsum(widths, axis=0)])
     off = at[here - first, here] - at
-    out = np.zeros_like(values)
+    aside = points // 2
+    ends = np.append(here[:aside], here[-aside:])
+    inner = np.zeros((*values.shape[:-1], count - 2 * aside))
+    outer = np.zeros((*values.shape[:-1], 2 * aside))
     for j in range(points):
         others = [k for k in range(points) if k != j]
         own = here - first == j
@@ -452,7 +460,9 @@ def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
         product = np.prod([np.where(here - first == k, 1.0, off[k]) for k in others], axis=0)
         weight = product / np.prod([at[j] - at[k] for k in others], axis=0)
         weight[own] = np.sum([1.0 / off[k][own] for k in others], axis=0)
-        out += weight * values[..., first + j]
+        inner += weight[aside:-aside] * values[..., j : count - 2 * aside + j]
+        outer += weight[ends] * values[..., first[ends] + j]
+    out = np.concatenate([outer[..., :aside], inner, outer[..., aside:]], axis=-1)
     return out, widths
 
 

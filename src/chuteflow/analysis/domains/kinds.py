@@ -34,8 +34,10 @@ INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
 DENSITIES = {"monotonic": 1, "inverted": 2}
 #: Turns of ln Q along a family are told apart if they differ by more.
 _TURN = 1e-6
-#: A net loss below this share of the largest is none: deep grains, in balance, come near to it.
-_BALANCE = 2e-3
+#: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
+#: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
+#: hold-up, is none either.
+_BALANCE, _DEEP, _RISE = 2e-3, 10.0, 1.5e-3
 #: Closed lines that span fewer columns and rows are none; those that span more are, wherever they are; those in
 #: between only so many columns or rows beside other lines.
 _SMALLEST_LOOP, _SMALL_LOOP, _BESIDE = 1.5, 6.0, 8.0
@@ -79,8 +81,9 @@ def kinds(fan: Fan, base: Base) -> Kinds:
     for first, last in zip(ends - [len(chain) for chain in chains], ends, strict=True):
         part = slice(first, last)
         pieces.append(_monotonic_pieces(zeros.log_t[part], fields[LOG_MASS, part], log_flux[part], rise[part]))
-        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part], zeros.doubt[:, part])
-        density |= _densities(fields[STEEPEST, part], zeros.doubt[2, part])
+        holdup = np.exp(fields[LOG_MASS, part])
+        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part], zeros.doubt[:, part], holdup)
+        density |= _densities(fields[STEEPEST, part], zeros.doubt[2, part], holdup)
     return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
 
 
@@ -276,10 +279,11 @@ def _most(pieces: Array) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def _interiors(low: Array, high: Array, doubt: Array) -> int:
+def _interiors(low: Array, high: Array, doubt: Array, holdup: Array) -> int:
     """Bits of INTERIORS; a net loss whose sign is in ``doubt`` (2 or more, k) does not make a flow mixed."""
     found = 0
-    rounding = _BALANCE * max(float(np.abs(low).max()), float(np.abs(high).max()))
+    scale = max(float(np.abs(low).max()), float(np.abs(high).max()))
+    rounding = _BALANCE * scale * (1.0 + holdup / _DEEP)
     low, high = low + (doubt[0] + rounding), high - (doubt[1] + rounding)
     if _peak(low) >= 0.0:
         found |= INTERIORS["dissipative"]
@@ -290,11 +294,12 @@ def _interiors(low: Array, high: Array, doubt: Array) -> int:
     return found
 
 
-def _densities(steepest: Array, doubt: Array) -> int:
+def _densities(steepest: Array, doubt: Array, holdup: Array) -> int:
+    """Bits of DENSITIES; a rise that is in ``doubt`` (k,) does not make a density inverted."""
     found = 0
     if _peak(1.0 - steepest) >= 0.0:
         found |= DENSITIES["monotonic"]
-    if _peak(steepest - doubt - 1.0) > 0.0:
+    if _peak(steepest - doubt - 1.0 - _RISE * holdup) > 0.0:
         found |= DENSITIES["inverted"]
     return found
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.analysis.domains.fan import Base, Fan, fan
-from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS, kinds
+from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS, Kinds, kinds
 from chuteflow.analysis.ranges import Range
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
@@ -27,6 +27,9 @@ _OF_BASE = PARAMETERS[2:]
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
 #: for. All but the first two are 1 where there are such flows, else 0.
 CODES = ("most", "families", *INTERIORS, *DENSITIES)
+#: The same in few numbers: whether there are hot flows (1, 0, or -1 where the theory does not say), the numbers of
+#: flows that share one flux and of families, and the bits of the kinds of interior and of density.
+SUMMARY = ("hot", "most", "families", "interior", "density")
 #: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
 #: each bound a point is.
 HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
@@ -118,8 +121,7 @@ class Plane:
 
 def code(plane: Plane, outer: float, inner: float) -> Code:
     """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
-    chute = plane.chute_at(outer, inner)
-    found = kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
+    found = _kinds(plane, plane.chute_at(outer, inner))
     return (
         found.most,
         found.families,
@@ -127,6 +129,17 @@ def code(plane: Plane, outer: float, inner: float) -> Code:
         *(int(found.density & bit > 0) for bit in DENSITIES.values()),
         *map(int, found.at),
     )
+
+
+def summary(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
+    found = _kinds(plane, plane.chute_at(outer, inner))
+    hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    return (hot, found.most, found.families, found.interior, found.density)
+
+
+def _kinds(plane: Plane, chute: Chute) -> Kinds:
+    return kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:
