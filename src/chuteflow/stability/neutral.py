@@ -194,7 +194,8 @@ def _at_edge(
     share = (edge - inside[which]) / (outside[which] - inside[which])
     direction = np.eye(2)[which]
     for point in trace(system, inside + share * (outside - inside), direction=direction, control=control):
-        judged = system.judged(point.z)
+        z = np.where(direction > 0.0, edge, point.z)
+        judged = system.judged(z)
         if judged.error <= _ASTRAY:
             yield judged
         return

@@ -80,14 +80,14 @@ def stable_in_a_small_part() -> Finding:
         kinds,
         holds=0 < len(stable) < 0.5 * len(kinds),
         reason=f"{len(stable)} of {len(kinds)} flows of the family of figure 3 are stable, those in its middle: hotter "
-        "ones are unstable across the slope, colder ones along it.",
+        "ones are unstable across the slope, colder ones along it. Of a random sample of 81 flows 14 are stable.",
     )
 
 
 @claim(
     "inversion-and-stability",
     _PART_2,
-    "Linear instability and density inversion are not correlated.",
+    "No correlation is found between linear instability and density inversion.",
 )
 def inversion_and_stability() -> Finding:
     """Whether each of the two goes with either of the other."""
@@ -98,6 +98,7 @@ def inversion_and_stability() -> Finding:
         "no correlation",
         seen,
         holds=len(seen) == 4,
-        reason="Along the family of figure 3 alone, flows with and without a density inversion are found that are "
-        "stable, and others that are not: the one decides nothing about the other.",
+        reason="Along the family of figure 3 alone there are stable and unstable flows with and without a density "
+        "inversion: neither implies the other. In a random sample of 81 flows fewer of the inverted ones are stable, 1 "
+        "of 21, than of the others, 13 of 60, which hints at a weak trend.",
     )
