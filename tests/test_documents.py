@@ -65,6 +65,7 @@ def names_in(value):
         "hot {chute}",
         "boundary --slope 0.29:0.3 --e 0.8 --ew 0.8 --roughness 0.6 --samples 2 --search-temperature 0.1:10",
         "claims --only slip-limit",
+        "stability {chute} --flux 3 --kx 0.01 --ky 0",
         "relax {chute} --flux 3 --duration 1",
     ],
     ids=lambda command: command.split()[0],
