@@ -32,7 +32,8 @@ class Setting:
     """What AUTO is given: a formulation in auto/, collocation intervals, and for the half-line where it is cut.
 
     The height of the cut is ``multiple`` times h, of the flow at hand or, ``fixed``, of that at the start. ``weighed``
-    leaves h and T, which range over decades, out of the arclength: without that AUTO may step over both folds at once.
+    leaves h and T, which range over decades, out of the arclength. Either way AUTO misses something in most
+    formulations; each has the better choice.
     """
 
     name: str

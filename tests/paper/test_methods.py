@@ -1,5 +1,7 @@
 """Figures by either method: the flows agree, and where the paper's method ends is said."""
 
+import sys
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,9 +14,9 @@ from chuteflow import Curve, Flow, curve
 from chuteflow.faces.cli import main
 from chuteflow.paper import figure_17
 from chuteflow.paper.branches import in_order
-from chuteflow.paper.curves import Curves
+from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
-from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, figure, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.paper.sources import NOT_REACHED, OVERBURDEN, Mapped, MappedCurves, Source, Unreached, reach, source
 from chuteflow.steady.collocation import LOG_M, LOG_T
@@ -223,10 +225,28 @@ def test_the_command_takes_the_method_and_says_so_in_the_data(tmp_path, capsys):
         assert (tmp_path / "figure_02.csv").read_text(encoding="utf-8") == written
 
 
+@pytest.mark.slow
+def test_all_figures_are_there_in_well_under_a_minute(tmp_path, capsys):
+    """40 s on two cores are allowed, and all is done on one: as much processor time is the same on a quiet machine."""
+    begin = time.process_time()
+    assert main(["figures", "--out", str(tmp_path)]) == 0
+    assert time.process_time() - begin < 40.0
+    names = {f"figure_{number:02d}.{kind}" for number in FIGURES for kind in ("png", "csv")}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert [line.split(":")[0] for line in capsys.readouterr().out.splitlines()] == [f"figure {n}" for n in FIGURES]
+
+
 def test_only_leaves_the_others_alone(tmp_path):
     (tmp_path / "figure_03.csv").write_text("of another run", encoding="utf-8")
     assert main(["figures", "--only", "2", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "figure_03.csv").read_text(encoding="utf-8") == "of another run"
+
+
+def test_the_figure_at_work_is_said_on_a_terminal_alone(tmp_path, monkeypatch, capsys):
+    for terminal in (True, False):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda terminal=terminal: terminal, raising=False)
+        assert main(["figures", "--only", "11", "--out", str(tmp_path)]) == 0
+        assert ("figure 11 ..." in capsys.readouterr().err) == terminal
 
 
 def test_flows_out_of_reach_are_said_by_the_command(cut_short, tmp_path, monkeypatch, capsys):
@@ -234,6 +254,13 @@ def test_flows_out_of_reach_are_said_by_the_command(cut_short, tmp_path, monkeyp
     monkeypatch.setattr(figure_17, "LINES", {"lun": figure_17.LINES["lun"]})
     assert main(["figures", "--only", "17", "--out", str(tmp_path), "--method", "mapped"]) == 0
     assert "the method does not reach all flows: see the notes in the data" in capsys.readouterr().out
+    titles = [
+        picture.get_suptitle()
+        for picture in (
+            drawn(17, trace("Title", "closure", [dissipative(0.3)], source)) for source in (Mapped(), OVERBURDEN)
+        )
+    ]
+    assert titles == ["lines end where the method does not converge: see the data", ""]
 
 
 @pytest.mark.parametrize("command", ["figures", "report"])

@@ -1,13 +1,16 @@
 """Studies: what may stand in one, which points it has, and what tells one from another."""
 
 import itertools
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chuteflow.errors import InputError
-from chuteflow.sweeps.study import from_canonical, from_dict, read
+from chuteflow.steady.quantities import NUMBERS
+from chuteflow.sweeps.outcome import Status
+from chuteflow.sweeps.study import KINDS, from_canonical, from_dict, read
 
 FIXED = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "T_surface": 1.0}
 
@@ -208,3 +211,16 @@ def test_lists_that_are_no_list_are_named(tmp_path, text, message):
     (tmp_path / "points.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         study("list", tmp_path, design={"file": "points.csv"})
+
+
+def test_the_study_of_the_documents_is_a_study(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    one = read(path)
+    assert one.points == 20000
+    assert one.chunks == 3
+    # Every quantity that can be kept is named.
+    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS))
+    assert all(f"{status.value} `{status.name.lower()}`" in page for status in Status)

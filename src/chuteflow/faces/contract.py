@@ -33,7 +33,7 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
     return {
         "chute": chute_object(flow_set.chute),
         "flows": [flow_object(flow, scales) for flow in flow_set],
-        "searched": _searched(flow_set.chute, flow_set.searched, scales),
+        "searched": searched_object(flow_set.chute, flow_set.searched, scales),
         "reason": flow_set.reason,
         **_units(scales, NUMBERS),
     }
@@ -53,7 +53,7 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
     return {
         "chute": chute_object(curve.chute),
         "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
-        "searched": _searched(curve.chute, curve.searched, scales),
+        "searched": searched_object(curve.chute, curve.searched, scales),
         "reason": curve.reason,
         **_units(scales, PLACE),
     }
@@ -106,7 +106,8 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
     return {**arrays, "special": special, "ends": list(branch.ends)}
 
 
-def _searched(chute: Chute, searched: Searched, scales: Scales | None) -> dict[str, Any]:
+def searched_object(chute: Chute, searched: Searched, scales: Scales | None = None) -> dict[str, Any]:
+    """The range searched."""
     warmth = factor("surface_temperature", chute, scales)
     return {
         "T_surface": [finite(value * warmth) for value in searched.surface_temperature],

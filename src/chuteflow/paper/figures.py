@@ -73,6 +73,23 @@ def computed(number: int, source: Source) -> FigureData:
     return module.compute() if number in WITHOUT_METHOD else module.compute(source)
 
 
+def drawn(number: int, data: FigureData) -> Figure:
+    """The picture of ``data``, with a line above it where a method does not reach all flows."""
+    from chuteflow.paper import style
+
+    picture = figure(number).draw(data)
+    if incomplete(data):
+        style.caption(picture, "lines end where the method does not converge: see the data")
+    return picture
+
+
+def incomplete(data: FigureData) -> bool:
+    """Whether flows of a figure are missing because a method does not reach them."""
+    from chuteflow.paper.sources import NOT_REACHED
+
+    return any(note.startswith(NOT_REACHED) for note in data.table().notes)
+
+
 def method_note(number: int, source: Source) -> str:
     """The method behind the data of figure ``number``, in words."""
     if number in WITHOUT_METHOD:

@@ -2,10 +2,11 @@
 
 # notation: as in chuteflow.theory.transport; lambda = 4 eta/3 + xi, the viscosity of compression.
 
-Density is only carried along, and waves that are short in z relax by viscosity: then (4 eta/3 + xi) w' balances
-the disturbance of the pressure, nu (dp/dnu) n, and (2.1) leaves at each height
+Density is only carried along, and waves that are short in z relax by viscosity and conduction. Conduction, the
+faster the shorter they are, leaves no heat flux (2.5): T'/T = (g4/g3) nu' = (g4/g3) nu n. Then lambda w' balances
+the disturbance of the pressure p = g1 T, and (2.1) leaves at each height
 
-    sigma_c(z) = -i kx u(z) - nu (dp/dnu) / (4 eta/3 + xi).
+    sigma_c(z) = -i kx u(z) - nu T (dg1/dnu + g1 g4/g3) / (4 eta/3 + xi).
 
 Far above the curve ends at -i kx u(infinity). It is not part of what a grid resolves: a grid shows some points
 of it, and no more of them are modes than there are unresolved densities.
@@ -18,6 +19,7 @@ import numpy as np
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.stability.base import Base, Resolution, shares
+from chuteflow.steady.flow import Flow
 from chuteflow.theory.laws import law
 
 #: Points of the curve for each node of a grid.
@@ -25,14 +27,21 @@ _FINENESS = 6
 
 
 def relaxation(flow_base: Base) -> tuple[Array, Array]:
-    """u and nu (dp/dnu)/(4 eta/3 + xi) on a grid several times as fine as that of ``flow_base``."""
-    resolution, flow = flow_base.resolution, flow_base.flow
+    """u and -Re sigma_c on a grid several times as fine as that of ``flow_base``."""
+    resolution = flow_base.resolution
     fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
-    profile = flow.at_overburden(shares(grid(fine.degree).nodes, fine)[0])
+    return relaxation_at(flow_base.flow, shares(grid(fine.degree).nodes, fine)[0])
+
+
+def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
+    """u and -Re sigma_c where ``share`` of the mass lies above."""
+    profile = flow.at_overburden(share)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, law(flow.chute.closure)
     g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
-    stiffness = (g.compressibility + nu * g.compressibility_slope) * T  # dp/dnu
+    warming = g.density_conductivity / g.conductivity
+    # dp/dnu where no heat flows
+    stiffness = (g.compressibility + nu * (g.compressibility_slope + g.compressibility * warming)) * T
     viscosity = (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * np.sqrt(T)
     return profile.velocity, nu * stiffness / viscosity
 

@@ -6,8 +6,8 @@ An eigenvalue of the coarse grid is a mode if
 - it comes back on a finer grid, with another map that reaches farther: the change is its error;
 - that change is a small part of its distance to the continuous spectrum.
 
-The continuous spectrum never grows. A mode that runs into it is no longer reported; an eigenvalue that grows on
-the coarse grid is followed to the finest, until it is a mode or is gone.
+The continuous spectrum never grows. A mode that runs into it is no longer reported. An eigenvalue that grows on
+the coarse grid is followed to the finest, until it is a mode, or is gone, or keeps changing from grid to grid.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from chuteflow.errors import InputError, SolveError
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
-from chuteflow.stability.base import Base, Resolution, base
+from chuteflow.stability.base import Base, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -29,14 +29,15 @@ from chuteflow.steady.flow import Flow
 #: ln(1 + M/T) + k T: what is dense or short in z needs points near the base.
 DEGREES = ((32, 44), (48, 64), (72, 96))
 _WEIGHTS, _LARGEST_WEIGHT = (0.5, 0.8), 16.0
-#: How far the grids reach, in ln p, for k >= _SHORT nu, with nu the density scale M/T; and more for longer waves.
+#: How far the grids reach, in ln p, for k h >= _SHORT M, and more for longer waves.
 _REACH, _SHORT = ((10.5, 13.0), (12.0, 14.5), (13.5, 16.5)), 1.0 / 60.0
 #: Steps in which the reach grows, so that wavenumbers share grids.
 _STRIDE = 1.5
 #: Largest share of the last coefficients of a resolved density.
 _TAIL = 0.03
-#: Largest share that the change between grids may have in the distance to the continuous spectrum.
-_DRIFT = 1e-3
+#: Largest share that the change between grids may have in the distance to the continuous spectrum; what moves by
+#: more than the second on the finest grids is an artefact of them.
+_DRIFT, _ARTEFACT = 1e-3, 0.03
 #: Error of a rate that is asked for unless told otherwise; relative for rates above 1.
 TOLERANCE = 1e-6
 #: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
@@ -105,6 +106,14 @@ class Mode:
         velocity = out[ALONG:-1]
         return out / velocity.ravel()[np.abs(velocity).argmax()]
 
+    def sampled(self, points: int = 201) -> tuple[Array, Complex]:
+        """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
+        base_ = self.operator.base
+        s = grid(points - 1).nodes[::-1]
+        share, _ = shares(s, base_.resolution)
+        matrix = interpolation_matrix(base_.grid, s)
+        return self.flow.at_overburden(share).height, self.fields @ matrix.T
+
 
 def relative_fields(of: Operator, vector: Complex) -> Complex:
     """n = nu'/nu, u, v, w and tau = T'/T at the nodes, (5, n), from the unknowns."""
@@ -154,11 +163,12 @@ class Disturbances:
         The wavenumbers are not checked.
         """
         found: list[Mode] = []
+        finest = level == len(DEGREES) - 1
         for candidate in self.candidates(kx, ky, level):
-            mode = self.checked(kx, ky, complex(candidate), level)
+            mode, drift = self._compared(kx, ky, complex(candidate), level)
             if mode is not None:
                 found.append(mode)
-            elif candidate.real > self.smallest_rate and not found:
+            elif candidate.real > self.smallest_rate and not found and (not finest or drift < _ARTEFACT):
                 return [], True
             if len(found) == count:
                 break
@@ -186,16 +196,20 @@ class Disturbances:
 
     def checked(self, kx: float, ky: float, candidate: complex, level: int = 0) -> Mode | None:
         """The mode on the fine grid that ``candidate`` of the coarse one stands for, or None if there is none."""
+        return self._compared(kx, ky, candidate, level)[0]
+
+    def _compared(self, kx: float, ky: float, candidate: complex, level: int) -> tuple[Mode | None, float]:
+        """The same, and the change between the grids in shares of the distance to the continuous spectrum."""
         coarse, fine = self._resolutions(kx, ky, level)
         of = self.operator(fine)
         sigma, vector = refined(of.matrix(kx, ky), of.weights, candidate)
         error = abs(sigma - candidate)
-        away = distance(np.array([sigma]), self._curve(coarse, kx))[0]
+        away = max(float(distance(np.array([sigma]), self._curve(coarse, kx))[0]), 1e-300)
         if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
-            return None
+            return None, error / away
         # Rounding leaves this much of a rate, whatever the grids say.
         noise = 1e-14 * (1.0 + abs(sigma))
-        return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector)
+        return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector), error / away
 
     def followed(self, kx: float, ky: float, near: complex, level: int = 0) -> Mode | None:
         """The mode whose rate is closest to ``near``, its value at wavenumbers close by: much faster than a search."""
@@ -218,13 +232,12 @@ class Disturbances:
 
     def _resolutions(self, kx: float, ky: float, level: int) -> tuple[Resolution, Resolution]:
         # Far above, where nu is below k, stresses change from those of inertia to those of viscosity.
-        k, warmth = float(np.hypot(kx, ky)), self.flow.surface_temperature
-        density = self.flow.mass_holdup / warmth
-        beyond = np.log(max(1.0, _SHORT * density / k)) if k else 0.0
+        k, warmth, mass = float(np.hypot(kx, ky)), self.flow.surface_temperature, self.flow.mass_holdup
+        beyond = np.log(max(1.0, _SHORT * mass / (k * self.flow.centre_of_mass))) if k else 0.0
         farther = _STRIDE * float(np.ceil(beyond / _STRIDE))
         # In powers of 2, so that wavenumbers share grids.
         decay = min(2.0 ** float(np.round(np.log2(k * warmth))), _LARGEST_WEIGHT) if k * warmth > 0.7 else 0.0
-        stretch = float(np.log1p(density)) + decay
+        stretch = float(np.log1p(mass / warmth)) + decay
         coarse, fine = (
             Resolution(round(degree * (1.0 + 0.5 * farther / reach)), reach + farther, weight * stretch)
             for degree, reach, weight in zip(DEGREES[level], _REACH[level], _WEIGHTS, strict=True)

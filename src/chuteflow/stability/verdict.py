@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chuteflow.errors import InputError, SolveError
+from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import refined
-from chuteflow.stability.modes import DEGREES, TOLERANCE, Disturbances, Mode
+from chuteflow.stability.modes import DEGREES, TOLERANCE, Disturbances, Mode, check_wavenumbers
 from chuteflow.steady.flow import Flow
 
 #: Range of k h that is searched; the shortest waves are two grains long, or as long as the flow is deep.
@@ -64,8 +64,10 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
     disturbances = Disturbances(flow)
     searched = wavenumbers(flow)
     if kx is not None and ky is not None:
-        found = disturbances.modes(kx, ky)
-        mode = found[0] if found else None
+        check_wavenumbers(kx, ky)
+        found = leading(disturbances, kx, ky, count=2, tolerance=TOLERANCE)
+        # At k = 0 the mass mode says nothing of stability.
+        mode = next((mode for mode in found if mode.kind != "mass"), None)
     else:
         mode = _Search(disturbances, searched, kx, ky).most_unstable()
     rate = disturbances.smallest_rate
@@ -77,6 +79,17 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
     """Smallest and largest wavenumber searched, in 1/d: from 1e-3/h to 10/h, and no waves shorter than two grains."""
     h = flow.centre_of_mass
     return RANGE[0] / h, min(RANGE[1], max(_SHORTEST * h, 1.0)) / h
+
+
+def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
+    """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
+
+    Raises:
+        InputError: for wavenumbers out of range, and where stability cannot be posed.
+        SolveError: where an eigenvalue that seems to grow cannot be told on the finest grids.
+    """
+    check_wavenumbers(kx, ky)
+    return leading(Disturbances(flow), kx, ky, count=count, tolerance=TOLERANCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +109,7 @@ class _Search:
     ) -> None:
         self.disturbances = disturbances
         self.fixed = (kx, ky)
-        for name, value in (("kx", kx), ("ky", ky)):
-            if value is not None and not np.isfinite(value):
-                raise InputError(f"wavenumber {name} = {value}: must be a finite number")
+        check_wavenumbers(kx or 0.0, ky or 0.0)
         self.bounds = (float(np.log(searched[0])), float(np.log(searched[1])))
 
     def most_unstable(self) -> Mode | None:
@@ -206,10 +217,14 @@ def leading(
             break
     if doubtful:
         raise SolveError(
-            f"something seems to grow at kx = {kx:g}, ky = {ky:g} that the finest grids do not resolve: "
-            "give other wavenumbers"
+            f"something seems to grow at kx = {kx:g}, ky = {ky:g} that the finest grids do not resolve, as happens "
+            f"in flows as cold as M/T = {_coldness(disturbances.flow):.2g}: take a warmer flow or other wavenumbers"
         )
     return found
+
+
+def _coldness(flow: Flow) -> float:
+    return flow.mass_holdup / flow.surface_temperature
 
 
 @dataclass(frozen=True, eq=False)

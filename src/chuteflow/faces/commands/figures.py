@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, figure, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
 
 
 class Numbers(click.ParamType):
@@ -58,23 +59,27 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     from chuteflow.faces.plots import write_figure
     from chuteflow.faces.writing import require_writable, written_beside
     from chuteflow.paper.data import csv_text
-    from chuteflow.paper.sources import NOT_REACHED, source
+    from chuteflow.paper.sources import source
 
     for path in names.values():
         require_writable(path, options.DRAWN)
     flows = source(method or METHODS[0], workers())
+    watched = sys.stderr.isatty()
     for number, path in names.items():
         begin = time.perf_counter()
+        if watched:
+            click.echo(f"figure {number} ...", nl=False, err=True)
         data = computed(number, flows)
-        write_figure(figure(number).draw(data), path)
+        write_figure(drawn(number, data), path)
         with written_beside(path.with_suffix(".csv")) as partial:
             partial.write_text(csv_text(data, method_note(number, flows)), encoding="utf-8")
         unchanged = (
             f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
         )
-        lost = any(note.startswith(NOT_REACHED) for note in data.table().notes)
-        ends = "; the method does not reach all flows: see the notes in the data" if lost else ""
+        ends = "; the method does not reach all flows: see the notes in the data" if incomplete(data) else ""
         took = f"{time.perf_counter() - begin:.1f} s"
+        if watched:
+            click.echo("\r\x1b[K", nl=False, err=True)
         click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}{ends}")
 
 

@@ -11,7 +11,7 @@ import click
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 from chuteflow.faces.commands.figures import METHOD_HELP, Numbers, directory, workers
-from chuteflow.paper.figures import FIGURES, METHODS, computed, figure, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
 
 if TYPE_CHECKING:
     from chuteflow.faces.report import Shown
@@ -57,7 +57,7 @@ def _drawn(number: int, flows: Source) -> Shown:
         number=number,
         title=FIGURES[number],
         caption=CAPTIONS[number],
-        picture=picture(figure(number).draw(data)),
+        picture=picture(drawn(number, data)),
         facts=facts(data),
         notes=(method_note(number, flows), *data.table().notes),
     )

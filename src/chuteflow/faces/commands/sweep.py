@@ -27,8 +27,8 @@ _EPILOG = (
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
 _SELDOM, _OFTEN = 10.0, 0.2
-#: Points that the time is estimated from.
-_SAMPLE = 2048
+#: Points that the time is estimated from: by a few, and by more.
+_SAMPLES = (128, 1024)
 
 
 class Chunks(click.ParamType):
@@ -77,9 +77,9 @@ def command(study: str, **given: Any) -> None:
             raise InputError(f"there is no store {given['out']} as yet: leave --status away to make it")
         click.echo(_status(Store.made(given["out"], read_study)))
         return
+    chosen = _chosen(read_study, given["chunks"])
     workers = _workers(given["workers"], given["cluster"])
-    store = Store.made(given["out"], read_study)
-    _run(store, _chosen(read_study, given["chunks"]), workers, alone=given["chunks"] is None)
+    _run(Store.made(given["out"], read_study), chosen, workers, alone=given["chunks"] is None)
 
 
 def _workers(count: int | None, cluster: str | None) -> Workers:
@@ -169,18 +169,26 @@ def _time(seconds: float) -> str:
 
 
 def _estimate(study: Study, workers: int) -> str:
+    few, many = (max(min(study.chunk, study.points, size), 1) for size in _SAMPLES)
+    short, long = _seconds(study, few), _seconds(study, many)
+    # A chunk costs so much for each point, and as much again whatever their number.
+    each = max(long - short, 0.0) / max(many - few, 1)
+    whole = each * study.points + max(long - each * many, 0.0) * study.chunks
+    return (
+        f"{study.points} points in {study.chunks} chunks of {study.chunk}; about {_time(whole / workers)} with "
+        f"{workers} workers, by the first {many} points"
+    )
+
+
+def _seconds(study: Study, points: int) -> float:
+    """Time that the first points of a study take."""
     from dataclasses import replace
 
     from chuteflow.sweeps.engine import solve_chunk
 
-    sample = replace(study, chunk=min(study.chunk, _SAMPLE, study.points))
     begin = time.perf_counter()
-    solve_chunk(sample, 0)
-    seconds = (time.perf_counter() - begin) / sample.chunk * study.points / workers
-    return (
-        f"{study.points} points in {study.chunks} chunks of {study.chunk}; about {_time(seconds)} with {workers} "
-        f"workers, by the first {sample.chunk} points"
-    )
+    solve_chunk(replace(study, chunk=points), 0)
+    return time.perf_counter() - begin
 
 
 def _status(store: Store) -> str:

@@ -1,4 +1,4 @@
-"""Flows of the paper whose disturbances are looked at."""
+"""Flows that several tests look at."""
 
 import pytest
 

@@ -1,0 +1,93 @@
+"""Pictures of modes: how large each field is at each height, and a section through one wave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chuteflow.analysis.results import FlowSet
+from chuteflow.faces import words
+from chuteflow.faces.plots import parameters
+from chuteflow.faces.stability_records import Answer
+from chuteflow.paper import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chuteflow.stability.modes import Mode
+
+#: Names of the disturbed fields on the axes, each relative to its largest size.
+_NAMES = (r"$\nu'$", "$u'$", "$v'$", "$w'$", "$T'$")
+#: Phases of a section, arrows along and up, and shades of the density.
+_PHASES, _ARROWS, _SHADES = 97, (17, 13), 13
+#: Sizes below this share of the largest velocity are none.
+_NOTHING = 1e-9
+
+
+def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
+    """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
+    drawn = [answer for answer in answers if answer.modes]
+    if not drawn:
+        reasons = [answer.reason for answer in answers if answer.reason]
+        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
+    figure, axes = style.panels(2, len(drawn), width=7.2, height=0.5 + 2.7 * len(drawn))
+    for row, answer in enumerate(drawn):
+        mode = answer.modes[0]
+        left, right = axes[2 * row], axes[2 * row + 1]
+        top = min(1.4 * answer.flow.depth, float(mode.height[0]))
+        _profiles(left, mode, top)
+        if mode.direction == "uniform":
+            right.set_axis_off()
+        else:
+            _section(right, mode, top)
+        left.set_title(
+            f"{words.among(answer.flow, flows)}: {mode.kind}, growth {mode.growth:.3g}",
+            loc="right",
+            **style.title(),
+        )
+    style.caption(figure, parameters(flows.chute))
+    return figure
+
+
+def _profiles(ax: Axes, mode: Mode, top: float) -> None:
+    height, disturbed = mode.sampled()
+    fields = np.abs(disturbed)
+    velocity = fields[1:4].max()
+    shown = height <= top
+    for i, (name, values) in enumerate(zip(_NAMES, fields, strict=True)):
+        size = values[shown].max()
+        if size > _NOTHING * velocity:
+            ax.plot(values[shown] / size, height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
+    ax.set_ylim(0.0, top)
+    style.name_axes(ax, "modulus over its largest, as listed", style.label("height"))
+    style.legend(ax, loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
+
+
+def _section(ax: Axes, mode: Mode, top: float) -> None:
+    """Density (shaded where it is higher) and velocity in the plane of the wave, over one wavelength."""
+    phase = np.linspace(0.0, 2.0 * np.pi, _PHASES)
+    height, (nu, u, v, w, _) = mode.sampled()
+    k = float(np.hypot(mode.kx, mode.ky))
+    forward = (mode.kx * u + mode.ky * v) / k
+    levels = np.linspace(0.0, top, 121)
+    density = np.real(_at(levels, height, nu)[:, None] * np.exp(1j * phase))
+    largest = np.abs(density).max() or 1.0
+    ax.contourf(phase / k, levels, density / largest, levels=np.linspace(-1.0, 1.0, _SHADES), cmap="RdBu_r", alpha=0.75)
+    across, up = np.linspace(0.0, 2.0 * np.pi, _ARROWS[0] + 2)[1:-1], np.linspace(0.0, top, _ARROWS[1] + 2)[1:-1]
+    waves = np.exp(1j * across)
+    along, rising = (np.real(_at(up, height, f)[:, None] * waves) for f in (forward, w))
+    # On the page a wavelength and the depth are of one size, whatever they are in grain diameters.
+    stretch = (2.0 * np.pi / k) / top
+    ax.quiver(across / k, up, along / stretch, rising, color=style.BLACK, width=0.0035, pivot="mid")
+    which = {"along": "$x$", "across": "$y$", "oblique": "the wave"}[mode.direction]
+    ax.set_ylim(0.0, top)
+    style.name_axes(ax, f"distance along {which}", style.label("height"))
+    title = "density disturbance (red more) and motion"
+    ax.set_title(title, loc="right", **style.title())
+
+
+def _at(levels: np.ndarray, height: np.ndarray, field: np.ndarray) -> np.ndarray:
+    return np.interp(levels, height, np.real(field)) + 1j * np.interp(levels, height, np.imag(field))
