@@ -128,8 +128,7 @@ def test_the_picture_names_what_is_there(found):
     number, kind = figure.axes
     assert number.get_xlim() == (0.7, 0.9)
     labels = {text.get_text() for text in number.texts}
-    assert "no flow" in labels
-    assert {"1", "2", "3"} & labels
+    assert labels >= {"2", "3"}
     assert "monotonic" in {text.get_text() for text in kind.texts}
 
 
@@ -144,7 +143,7 @@ def test_the_picture_names_what_is_there(found):
         ([*AXES, *REST[:4], "--tolerance", "1"], "tolerance"),
         ([*AXES, *REST[:4], "--plot", "map.gif"], "must end in"),
         (["--ew", "0.9:0.7", *AXES[2:], *REST], "must rise"),
-        (["--ew", "0.7:1.7", *AXES[2:], *REST], "wall_restitution"),
+        (["--ew", "0.7:1.7", *AXES[2:], *REST], "wall restitution"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(arguments, what, capsys):

@@ -109,7 +109,7 @@ def test_the_coldest_flows_are_refused_or_right():
     assert abs(mode.sigma - (2.248243e-3 + 1.5541804e-2j)) < 2e-6
 
 
-@pytest.mark.parametrize(("seed", "count"), [(5, 2), pytest.param(6, 100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "count"), [(5, 2), pytest.param(11, 40, marks=pytest.mark.slow)])
 def test_what_grows_in_random_flows_grows_on_another_family_of_maps(seed, count):
     told = 0
     for flow in random_flows(seed, count):
