@@ -1,6 +1,7 @@
 """Every flow of every point against those of chutes that are searched one by one, by another method."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,11 +55,9 @@ def chute_of(chunk, i):
 def bases_below(chute, temperature, stress):
     """Normal stresses down to ``stress`` at which the trajectory of a surface temperature meets the base,
     by another program of integration."""
-    one = Batch.of(
-        chute.closure,
-        chute.surface,
-        *(np.array([x]) for x in (chute.slope, chute.restitution, chute.wall_restitution, chute.roughness)),
-    )
+    numbers = (chute.slope, chute.restitution, chute.wall_restitution, chute.roughness)
+    slope, e, ew, r = (np.array([x]) for x in numbers)
+    one = Batch.of(chute.closure, chute.surface, slope, e, ew, r)
 
     def along(log_p, state):
         rows = np.array([[log_p], [state[0]], [state[1]], [0.0], [0.0], [0.0]])
@@ -78,6 +77,7 @@ def bases_below(chute, temperature, stress):
     solved = solve_ivp(
         rate, (first[0], np.log(stress)), first[1:3], method="DOP853", events=excess, rtol=1e-11, atol=1e-13
     )
+    assert solved.t_events is not None
     return np.exp(solved.t_events[0])
 
 
@@ -114,8 +114,8 @@ def compare(condition, points, seed):
     assert (chunk.error[chunk.error > 0] <= study.tolerance).all()
     more = 0
     for i in range(points):
-        value = float(chunk.parameters[condition][i])
-        more += assert_same_flows(chunk, i, flows(chute_of(chunk, i), **{condition: value}))
+        asked: dict[str, Any] = {condition: float(chunk.parameters[condition][i])}
+        more += assert_same_flows(chunk, i, flows(chute_of(chunk, i), **asked))
     return chunk, more
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chuteflow.analysis.ranges import DEEPEST, WIDEST
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T
-from chuteflow.sweeps.bases import FLOOR, LADDER, SAFETY, Flows, flows_on, meets_base
+from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
 from chuteflow.sweeps.zeros import zeros
@@ -46,8 +46,6 @@ _BEYOND = 1.1
 _ASIDE, _LITTLE = 1.0, 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
-#: The share of a change that is left in the finer of two integrations, at most.
-_CHANCE = 0.1
 #: A flow meets the value asked for to this.
 _MEETS = 1e-11
 
@@ -332,11 +330,11 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
         # What changes at a given surface temperature is carried over to the given quantity.
         change = there.macroscopic[:LOG_T] - here[:LOG_T]
         off = there.macroscopic[problem.which] - problem.target[brackets.lane[pending]]
-        along = near.gradient(pending) * (change[problem.which] / slope[pending])
-        rest = np.abs(near.gradient(pending) * (off - change[problem.which]) / slope[pending])
-        # Both parts may cancel by chance: no more of them than of the errors that they stand for.
-        carried = np.maximum(np.abs(change - along), _CHANCE * (np.abs(change) + np.abs(along)))
-        error = np.maximum(SAFETY * (carried + rest).max(axis=0), FLOOR)
+        along = near.gradient(pending) / slope[pending]
+        carried = np.abs(change - along * change[problem.which])
+        rest = np.abs(along * (off - change[problem.which]))
+        least = least_error(finer) * (1.0 + np.abs(along).max(axis=0))
+        error = np.maximum(SAFETY * (carried + rest).max(axis=0), least)
         moved = there.macroscopic.copy()
         moved[:LOG_T] -= near.gradient(pending) * (off / slope[pending])
         moved[LOG_T] -= off / slope[pending]

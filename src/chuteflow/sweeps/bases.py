@@ -21,8 +21,8 @@ from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
 LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Accuracy(1e-12, 1e-8))
 #: The error claimed is this many times the change from one accuracy to the next.
 SAFETY = 2.0
-#: Least error ever claimed.
-FLOOR = 1e-12
+#: The least error ever claimed, and in the tolerance of a step: two integrations may agree by chance.
+_FLOOR, _CHANCE = 1e-12, 0.3
 #: The finer integrations end a little below the last flow.
 _BELOW = 1.02
 
@@ -106,7 +106,7 @@ def at_temperature(
         fine = flows_on(batch, temperature, Found(pending[found.lane], found.state, unsettled))
         trouble = np.zeros(len(batch), dtype=bool)
         trouble[pending] = found.trouble
-        fine, agreed = compared(len(batch), previous, fine)
+        fine, agreed = compared(len(batch), previous, fine, least_error(finer))
         worst = np.zeros(len(batch))
         np.maximum.at(worst, fine.lane, fine.error)
         done = unsettled & agreed & ~trouble & (worst <= tolerance)
@@ -117,13 +117,18 @@ def at_temperature(
     return out.take(out.macroscopic[LOG_M] <= np.log(largest_holdup)), unsettled
 
 
-def compared(lanes: int, coarse: Flows, fine: Flows) -> tuple[Flows, NDArray[np.bool_]]:
-    """The finer flows with the error that their distance from the coarser ones tells, and the lanes on which both
-    are equally many."""
+def least_error(accuracy: Accuracy) -> float:
+    """The least error that is claimed of ln Q, ln h and ln M at a surface temperature."""
+    return max(_FLOOR, _CHANCE * accuracy.tolerance)
+
+
+def compared(lanes: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
+    """The finer flows with the error that their distance from the coarser ones tells, at ``least`` so much, and the
+    lanes on which both are equally many."""
     many = np.bincount(coarse.lane, minlength=lanes)
     agreed = many == np.bincount(fine.lane, minlength=lanes)
     error = np.full(fine.lane.size, np.inf)
     # Both are in order of lanes, and along each from the surface down.
     change = np.abs(fine.macroscopic[:, agreed[fine.lane]] - coarse.macroscopic[:, agreed[coarse.lane]])
-    error[agreed[fine.lane]] = np.maximum(SAFETY * change[:LOG_T].max(axis=0, initial=0.0), FLOOR)
+    error[agreed[fine.lane]] = np.maximum(SAFETY * change[:LOG_T].max(axis=0, initial=0.0), least)
     return Flows(fine.lane, fine.temperature, fine.state, fine.macroscopic, error), agreed
