@@ -33,10 +33,12 @@ def test_map_json_files_and_picture(capsys, tmp_path):
 
 def test_the_report_and_rows_of_csv(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(growth.sys.stderr, "isatty", lambda: True, raising=False)
-    assert run(f"{SMALL} --save {tmp_path / 'map.csv'}") == 0
+    away = SMALL.replace("0:0.02", "0.05:0.07").replace("0:0.03", "0.05:0.08")
+    assert run(f"{away} --save {tmp_path / 'map.csv'}") == 0
     told = capsys.readouterr()
-    assert "largest growth on the map: 0.003" in told.out
-    assert "neutral curve" in told.out
+    assert "largest growth on the map: -" in told.out
+    assert "growing: 0 of 20 points" in told.out
+    assert "no neutral curve in this range" in told.out
     assert "20% of the map" in told.err
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert rows[0] == "kx,ky,growth,frequency"
