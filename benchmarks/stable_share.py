@@ -21,8 +21,8 @@ def drawn(seed: int, draws: int) -> Iterator[Flow]:
     for _ in range(draws):
         e, ew, roughness = random.uniform(0.6, 0.95), random.uniform(0.5, 0.95), random.uniform(0.5, 0.866)
         slope, warmth = random.uniform(0.2, 0.55), 10.0 ** random.uniform(-1.0, 1.0)
-        numbers = [round(float(value), 3) for value in (slope, e, ew, roughness)]
-        yield from flows(Chute(*numbers), T_surface=round(float(warmth), 3))[:2]
+        slope, e, ew, roughness = (round(float(value), 3) for value in (slope, e, ew, roughness))
+        yield from flows(Chute(slope, e, ew, roughness), T_surface=round(float(warmth), 3))[:2]
 
 
 def kind(flow: Flow) -> str:

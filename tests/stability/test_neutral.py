@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +21,10 @@ PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 class KnownPlane:
     """Three modes: one grows by ``growth(a, b)``, one decays, and one stands still a little below zero."""
 
-    growth: object
+    growth: Any
     size: tuple[float, float] = (1.0, 1.0)
 
-    def wave(self, z):
+    def wave(self, z) -> Any:
         values = np.array([self.growth(*z) + 0.3j * z[0], -0.5, -2e-5])
         of = SimpleNamespace(matrix=lambda kx, ky: np.diag(values), weights=np.ones(3))
         return SimpleNamespace(coarse_operator=lambda kx, ky, level: of), 0.0, 0.0
@@ -116,7 +117,11 @@ def test_maps_out_of_range_are_refused(settings, said):
 
 def test_families_out_of_range_are_refused():
     flows = chuteflow.flows(PAPER, Q=3.0)
-    for settings, said in (({"angle": 91.0}, "from 0"), ({"angle": 0.0, "depth_wavenumber": (0.1, 0.0)}, "must rise")):
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"angle": 91.0}, "from 0"),
+        ({"angle": 0.0, "depth_wavenumber": (0.1, 0.0)}, "must rise"),
+    ]
+    for settings, said in refused:
         with pytest.raises(InputError, match=said):
             family_map(flows, **settings)
     with pytest.raises(InputError, match="at least 2"):

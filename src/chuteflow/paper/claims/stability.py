@@ -10,7 +10,7 @@ from chuteflow.paper.claims.shared import SLOPE, named_flows
 from chuteflow.paper.materials import dissipative
 
 #: Surface temperatures of the family of figure 3 that stand for it beside flows A and C, hot to cold.
-_WARMTH = (20.0, 3.0, 1.7, 1.2, 0.5)
+_WARMTH = (20.0, 1.7, 1.2, 0.5)
 #: A dense flow of a sample of chutes, and its surface temperature.
 _DENSE = Chute(0.392, 0.748, 0.872, 0.65), 0.114
 _PART_2 = "section 3.5, and Part 2"
