@@ -48,8 +48,9 @@ def random_study(condition, points, seed):
 
 def chute_of(chunk, i):
     p = chunk.parameters
-    words = SURFACES[int(p["surface"][i])], tuple(LAWS)[int(p["closure"][i])]
-    return Chute(*(float(p[name][i]) for name in CHUTE), *words)
+    slope, e, ew, roughness = (float(p[name][i]) for name in CHUTE)
+    surface, closure = SURFACES[int(p["surface"][i])], tuple(LAWS)[int(p["closure"][i])]
+    return Chute(slope, e, ew, roughness, surface, closure)
 
 
 def bases_below(chute, temperature, stress):
