@@ -2,7 +2,7 @@
 
 Times are medians of repeats: of wall time, as the user waits, and of processor time, which other work on the machine
 disturbs less, by which targets are judged, and of which the ratios are taken. The table is printed, and written to
-benchmarks/results/table.txt. What is not installed is left out, and the table says so.
+benchmarks/results/table.txt; it takes a few minutes. What is not installed is left out, and the table says so.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: ratios are o
 import platform
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,8 @@ import scipy
 
 import by_scipy
 import curves
-from chuteflow import Chute, FlowSet, curve, flows
+import sweeps
+from chuteflow import Chute, FlowSet, curve, domain, flows
 from chuteflow.steady.collocation import LOG_Q
 from chuteflow.steady.solver import Condition, resolve
 from timing import Row, median_time, table
@@ -47,16 +50,23 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
 
 
 def main() -> None:
-    near, exact = flows(PAPER, Q=NEIGHBOUR), flows(PAPER, Q=FLUX)
-    parts = {
-        "Speed and memory of the package": [*one_flow(near), *search(), *whole_curve(), *processes(), memory()],
-        "One flow, by scipy's solve_bvp": against_scipy(near, exact),
-        "The curve of figure 3 from Q = 6 to 0.7, with both folds": curves.compared(),
+    parts: dict[str, Callable[[], list[Row]]] = {
+        "Speed and memory of the package": of_the_package,
+        "One flow, by scipy's solve_bvp": lambda: against_scipy(flows(PAPER, Q=NEIGHBOUR), flows(PAPER, Q=FLUX)),
+        "The curve of figure 3 from Q = 6 to 0.7, with both folds": curves.compared,
+        "Many chutes": many_chutes,
     }
-    text = "\n\n".join([_machine(), *(f"{title}\n\n{table(rows)}" for title, rows in parts.items())])
-    print(text)
+    blocks = [_machine()]
+    print(blocks[0], flush=True)
+    for title, measure in parts.items():
+        blocks.append(f"{title}\n\n{table(measure())}")
+        print(f"\n{blocks[-1]}", flush=True)
     RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(text + "\n", encoding="utf-8")
+    RESULTS.write_text("\n\n".join(blocks) + "\n", encoding="utf-8")
+
+
+def of_the_package() -> list[Row]:
+    return [*one_flow(flows(PAPER, Q=NEIGHBOUR)), *search(), *whole_curve(), *processes(), memory()]
 
 
 def _machine() -> str:
@@ -152,6 +162,19 @@ def processes() -> list[Row]:
         time = median_time(lambda call=call: subprocess.run(call, capture_output=True, check=True), repeats)
         out.append(Row(what, time.wall, "ms", time.cpu, target))
     return out
+
+
+def many_chutes() -> list[Row]:
+    """Rates of sweeps; their overhead and memory take longer, and are measured by sweeps.py. A domain."""
+    with tempfile.TemporaryDirectory() as folder:
+        rates = [
+            sweeps.rate(Path(folder), "T_surface", 20_000.0, 5_000.0),
+            sweeps.rate(Path(folder), "Q", 1_000.0, 200.0),
+        ]
+    plane = ("slope", 0.1, 0.5), ("roughness", 0.5, 0.866)
+    spent = median_time(lambda: domain(PAPER, *plane, size=(400, 400)), 1).cpu / 1e3
+    note = f"slope and roughness, all classes; {spent:.1f} s of one core"
+    return [*rates, Row("a domain of 400x400, on 2 cores", spent / sweeps.CORES, "s", None, 20.0, note=note)]
 
 
 def memory() -> Row:

@@ -32,9 +32,6 @@ if "quick" not in tags:  # noqa: F821, Sphinx gives it
     extensions.append("sphinx.ext.viewcode")
 exclude_patterns = ["_ext"]
 
-# Two hyphens begin an option, and are not to become a dash.
-smartquotes = False
-
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 

@@ -1,5 +1,6 @@
 """The directive ``commands``: the help of every command, asked of the commands themselves."""
 
+import re
 from collections.abc import Iterator
 from importlib import import_module
 
@@ -9,6 +10,9 @@ from package import FromPackage
 from sphinx.application import Sphinx
 
 from chuteflow.faces.cli import chuteflow as program
+
+#: An option in a sentence.
+_OPTION = re.compile(r"(--[a-z][\w-]*)")
 
 
 class Commands(FromPackage):
@@ -26,12 +30,12 @@ class Commands(FromPackage):
         title = f"chuteflow {name}"
         section = nodes.section(ids=[f"chuteflow-{name}"], names=[title])
         section += nodes.title(title, title)
-        section += nodes.paragraph(command.help, command.help)
+        section += _prose(command.help or "")
         usage = command.get_usage(context).removeprefix("Usage: ")
         section += nodes.literal_block(usage, usage, language="text")
         section += self._options(command, context)
         for paragraph in (command.epilog or "").split("\n\n"):
-            section += _example(paragraph) if paragraph.startswith("Example: ") else nodes.paragraph("", paragraph)
+            section += _example(paragraph) if paragraph.startswith("Example: ") else _prose(paragraph)
         return section
 
     def _options(self, command: click.Command, context: click.Context) -> nodes.definition_list:
@@ -39,7 +43,7 @@ class Commands(FromPackage):
         for written, help_ in _records(command, context):
             item, meaning = nodes.definition_list_item(), nodes.definition()
             item += nodes.term("", "", nodes.literal(written, written))
-            meaning += nodes.paragraph(help_, help_)
+            meaning += _prose(help_)
             item += meaning
             listed += item
         return listed
@@ -50,6 +54,14 @@ def _records(command: click.Command, context: click.Context) -> Iterator[tuple[s
         record = parameter.get_help_record(context)
         if record and "--help" not in parameter.opts:
             yield record
+
+
+def _prose(text: str) -> nodes.paragraph:
+    """A paragraph with options as literals, whose two hyphens are not to become a dash."""
+    paragraph = nodes.paragraph(text)
+    for i, part in enumerate(_OPTION.split(text)):
+        paragraph += nodes.literal(part, part) if i % 2 else nodes.Text(part)
+    return paragraph
 
 
 def _example(paragraph: str) -> nodes.literal_block:

@@ -16,8 +16,9 @@ _ELSEWHERE = {"__version__", "QUANTITIES"}
 
 
 def public_names() -> list[str]:
-    """The names at the top of the package that the page of the package documents."""
-    return [name for name in chuteflow.__all__ if name not in _ELSEWHERE]
+    """The names at the top of the package that the page of the package documents: functions, classes, errors."""
+    names = [name for name in chuteflow.__all__ if name not in _ELSEWHERE]
+    return sorted(names, key=lambda name: (isinstance(getattr(chuteflow, name), type), name.endswith("Error")))
 
 
 def modules_of(layer: str) -> Iterator[str]:
@@ -72,6 +73,7 @@ class Layer(_Generated):
         """One section for each module."""
         left_out = ", ".join(public_names())
         layer = self.arguments[0]
+        yield from (import_module(f"chuteflow.{layer}").__doc__ or "", "")
         chosen = [f"chuteflow.{layer}.{name}" for name in self.content] or modules_of(layer)
         for name in chosen:
             title = name.removeprefix("chuteflow.")

@@ -21,8 +21,8 @@ class FromPackage(SphinxDirective):
         return "quick" in self.env.app.tags
 
     def note_package(self) -> None:
-        """Let the page depend on every module."""
-        for path in Path(chuteflow.__file__).parent.rglob("*.py"):
+        """Let the page depend on every module, and on what makes the page of them."""
+        for path in [*Path(chuteflow.__file__).parent.rglob("*.py"), *Path(__file__).parent.glob("*.py")]:
             self.env.note_dependency(str(path))
 
     def table(self, heading: Sequence[Cell], rows: Iterable[Sequence[Cell]], widths: Sequence[int]) -> nodes.table:

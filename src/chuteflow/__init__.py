@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning, boundary
     from chuteflow.analysis.curve import curve
     from chuteflow.analysis.domains.maps import Domain, domain
     from chuteflow.analysis.enumeration import flows
@@ -22,6 +23,8 @@ __version__ = "0.1.0"
 
 # Imported when first asked for, so that the command line starts quickly.
 _HOMES = {
+    "Boundary": "analysis.boundaries.boundary",
+    "BoundarySet": "analysis.boundaries.boundary",
     "Branch": "analysis.results",
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
@@ -37,6 +40,8 @@ _HOMES = {
     "Searched": "analysis.results",
     "SolveError": "errors",
     "SpecialPoint": "analysis.results",
+    "Turning": "analysis.boundaries.boundary",
+    "boundary": "analysis.boundaries.boundary",
     "Stability": "stability.verdict",
     "HotModel": "analysis.hot",
     "curve": "analysis.curve",
@@ -50,6 +55,8 @@ _HOMES = {
 
 __all__ = [
     "QUANTITIES",
+    "Boundary",
+    "BoundarySet",
     "Branch",
     "Chute",
     "ChuteflowError",
@@ -66,7 +73,9 @@ __all__ = [
     "SolveError",
     "SpecialPoint",
     "Stability",
+    "Turning",
     "__version__",
+    "boundary",
     "curve",
     "domain",
     "flows",

@@ -34,7 +34,7 @@ def random_planes(seed, surface="free"):
 
 def enumerated(chute):
     """The class of a chute by the curve of all its families and all flows at each temperature."""
-    found = curve(chute, tolerance=1e-8, points=600)
+    found = curve(chute, tolerance=1e-8, points=300)
     stretches = []
     for branch in found.branches:
         turns = [point.flow.mass_flux for point in branch.special if point.kind == "fold-Q"]

@@ -14,7 +14,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -130,17 +130,16 @@ def test_a_column_of_the_map_tells_what_the_curve_tells(client):
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": str((0.3 - 0.05) / 0.65)}
     column = client.get("/ask/map", params=query).json()
     assert (column["outer"], column["inner"], column["at"]) == ("slope", "roughness", pytest.approx(0.3))
-    assert len(column["codes"]) == len(column["stops"]) + 1
+    most = column["parts"]["most"]
+    assert len(most["values"]) == len(most["stops"]) + 1
     for roughness, count in ((0.6, 3), (0.82, 2)):
-        code = column["codes"][sum(stop < roughness for stop in column["stops"])]
         says = client.get("/ask/curve", params=PAPER | {"roughness": str(roughness)}).json()["says"]
-        assert code[column["names"].index("most")] == count == max(map(int, re.findall(r"(\d+) for Q", says)))
-    hot = column["names"].index("hot")
-    edge = next(
-        stop
-        for stop, pair in zip(column["stops"], pairwise(column["codes"]), strict=True)
-        if pair[0][hot] != pair[1][hot]
-    )
+        assert (
+            most["values"][sum(stop < roughness for stop in most["stops"])]
+            == count
+            == max(map(int, re.findall(r"(\d+) for Q", says)))
+        )
+    (edge,) = column["parts"]["hot"]["stops"]
     # Hot flows end where lambda = 3 or where the base gives nothing, in closed form.
     sides = [chuteflow.hot(chuteflow.Chute(0.3, 0.8, 0.8, edge + off)).exists for off in (-0.004, 0.004)]
     assert sides == [True, False]
@@ -171,21 +170,30 @@ def test_a_bad_map_is_refused(client, change, said):
 def test_an_unstable_flow_and_its_fastest_wave(client):
     given = client.get("/ask/stability", params=PAPER | {"Q": "3", "flow": "1"}).json()
     assert given["state"] == "unstable"
-    assert given["says"].startswith("unstable: waves across the slope, growth 0.001")
-    assert given["waves"] == "36 waves of 4.5 d to 2500 d tried"
+    assert given["says"] == "unstable: waves across the slope, growth 0.001, wavelength 500 d"
+    assert given["waves"] == "waves of 2.5 d to 25000 d searched"
     fastest = given["fastest"]
     flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[1]
     (mode,) = Disturbances(flow).modes(0.0, 2.0 * math.pi / fastest["length"])
     assert mode.growth == pytest.approx(fastest["growth"], abs=1e-6)
 
 
-def test_a_flow_that_no_wave_grows_on_is_called_stable(monkeypatch):
-    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[1]
-    # Short waves decay on every flow.
-    monkeypatch.setattr(growth, "_WAVENUMBERS", (1.0, 2.0))
-    verdict = growth.verdict(flow)
-    assert (verdict.state, verdict.fastest, verdict.tried.waves) == ("stable", None, 6)
-    assert sentences.of_stability(verdict, flow.chute, None) == "stable: none of the waves tried grows"
+@pytest.mark.parametrize(
+    ("direction", "kx", "ky", "grows", "said"),
+    [
+        ("oblique", 0.1, 0.1, True, "unstable: oblique waves, growth 0.02, wavelength 44 d"),
+        ("uniform", 0.0, 0.0, True, "unstable: as a whole, growth 0.02"),
+        ("along", 0.1, 0.0, False, "stable: no wave grows"),
+    ],
+)
+def test_the_words_on_stability(monkeypatch, direction, kx, ky, grows, said):
+    mode = SimpleNamespace(kx=kx, ky=ky, direction=direction, growth=0.02, error=1e-9)
+    found = SimpleNamespace(stable=not grows, mode=mode, searched=(1e-3, 10.0))
+    monkeypatch.setattr(growth, "stability_of", lambda flow: found)
+    chute = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
+    verdict = growth.verdict(chuteflow.flows(chute, Q=3.0)[0])
+    assert sentences.of_stability(verdict, chute, None) == said
+    assert sentences.of_waves(verdict, chute, None) == "waves of 0.63 d to 6300 d searched"
 
 
 def test_stability_that_cannot_be_posed_is_not_known(client):

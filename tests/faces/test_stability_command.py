@@ -34,6 +34,7 @@ def test_json_object_holds_the_modes_of_every_flow(capsys):
         assert flow["mode"]["kind"] == "along"
         assert flow["mode"]["speed"] == pytest.approx(flow["mode"]["frequency"] / 0.01)
     coldest = chuteflow.stability_of(chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[2], kx=0.01, ky=0.0)
+    assert coldest.mode is not None
     assert told["flows"][2]["mode"]["growth"] == coldest.mode.growth
 
 

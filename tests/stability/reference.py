@@ -138,7 +138,7 @@ class Problem:
                 for wave in (np.cos(PHASES), np.sin(PHASES)):
                     fields = np.repeat(steady[None], len(nodes), axis=0)
                     fields[np.arange(len(nodes)), field, :, nodes] += 1j * STEP * wave
-                    response.append(self.rates(fields)[:, :, 0, :].imag.reshape(len(nodes), -1) / STEP)
+                    response.append(np.imag(self.rates(fields)[:, :, 0, :]).reshape(len(nodes), -1) / STEP)
                 matrix[:, field * n + nodes] = (response[0] + 1j * response[1]).T
         nu = np.exp(self.log_nu)
         weights = np.concatenate([np.ones(n), nu, nu, nu, 1.5 * nu])

@@ -1,6 +1,7 @@
 """The full equations and Richman's base: tensors, steady flows, symmetry, and short waves."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,10 @@ CHUTE = Chute(0.3, 0.8, 0.75, ROUGHNESS)
 def rotation(angle):
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def tensor(array) -> Any:
+    return tuple(tuple(row) for row in array)
 
 
 def random(seed, *shape):
@@ -57,10 +62,10 @@ def test_stress_and_traction_turn_with_the_flow_about_the_normal_of_the_base(ang
     p, eta, xi = 1.3, 0.4, 0.2
 
     def stress(g):
-        return np.array(pressure_tensor(p, eta, xi, tuple(map(tuple, g))))
+        return np.array(pressure_tensor(p, eta, xi, tensor(g)))
 
     def push(u, g):
-        return np.array(traction(tuple(u), 0.9, tuple(map(tuple, g)), 2.1, ROUGHNESS))
+        return np.array(traction(tuple(u), 0.9, tensor(g), 2.1, ROUGHNESS))
 
     np.testing.assert_allclose(stress(turned), turn @ stress(grad) @ turn.T, atol=1e-14)
     np.testing.assert_allclose(push(turn @ slip, turned), turn @ push(slip, grad), atol=1e-14)
@@ -71,13 +76,13 @@ def test_stress_is_newtonian():
     p, eta, xi = 1.3, 0.4, 0.2
     strain = 0.5 * (grad + grad.T) - np.trace(grad) / 3.0 * np.eye(3)
     expected = (p - xi * np.trace(grad)) * np.eye(3) - 2.0 * eta * strain
-    np.testing.assert_allclose(pressure_tensor(p, eta, xi, tuple(map(tuple, grad))), expected, atol=1e-14)
+    np.testing.assert_allclose(pressure_tensor(p, eta, xi, tensor(grad)), expected, atol=1e-14)
 
 
 def test_traction_in_plain_shear_is_that_of_the_paper():
     # (3.13), with A in front of r^2/2, and (3.14).
     u, rate, root, A = 0.7, 0.4, 1.2, 3.1
-    along, across, up = traction((-u, 0.0, 0.0), root, ((0.0, 0.0, rate), (0.0,) * 3, (0.0,) * 3), A, ROUGHNESS)
+    along, across, up = traction((-u, 0.0, 0.0), root, tensor([[0.0, 0.0, rate], [0.0] * 3, [0.0] * 3]), A, ROUGHNESS)
     k = boundary.kappa(ROUGHNESS)
     assert along == pytest.approx(np.sqrt(2 / np.pi) / root * (-k * u + (k - 0.5 * A * ROUGHNESS**2) * rate))
     assert across == 0.0
@@ -189,7 +194,7 @@ def local_problem(flow, at, node, kx, kappa, gradients, steady):
             FirstOrder(rise, 1j * kappa * f.slope),
         )
 
-    moving = motion(Fields(numbers[0], tuple(numbers[1:4]), numbers[4]), gradient, grains(at))
+    moving = motion(Fields(numbers[0], (numbers[1], numbers[2], numbers[3]), numbers[4]), gradient, grains(at))
     a = np.concatenate([force.slope for force in moving.forces])
     b = np.array([1.0, *(np.asarray(i.value).item() for i in moving.inertia[1:])])
     return a, b

@@ -66,6 +66,7 @@ KINDS = {
     "fold-T": "two flows of one surface temperature meet",
     "density-inversion": "onset of a volume fraction that rises with height",
     "interior-change": "the interior changes between dissipative, mixed and productive",
+    "stability-change": "small disturbances begin to grow, or cease to",
 }
 
 

@@ -141,7 +141,9 @@ def _hatch(ax: Axes, polygons: Sequence[NDArray[np.float64]]) -> None:
 def _draw(ax: Axes, lines: Sequence[Boundary], strokes: dict[str, tuple[style.Stroke, str]]) -> None:
     for one in lines:
         if one.kind in strokes:
-            ax.plot(*one.points.T, **strokes[one.kind][0].line(_LINE), zorder=2.0, scalex=False, scaley=False)
+            # The bounds in closed form stand above what begins or ends there.
+            above = 2.5 if one.kind in ("F21=0", "delta=0", "lambda=3") else 2.0
+            ax.plot(*one.points.T, **strokes[one.kind][0].line(_LINE), zorder=above, scalex=False, scaley=False)
 
 
 def _label(ax: Axes, found: Domain, values: NDArray[Any], words: dict[int, str]) -> None:

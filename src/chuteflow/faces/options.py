@@ -10,7 +10,9 @@ import click
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
+    from chuteflow.analysis.results import FlowSet
     from chuteflow.steady.chute import Chute
+    from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -178,6 +180,19 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
 
     argument, quantity = _CONDITIONS[named[0]]
     return {argument: read_amount(f"--{named[0]}", given[named[0]], quantity, scales, chute.slope)}
+
+
+def chosen(found: FlowSet, which: int | None) -> Flow:
+    """Flow number ``which`` of those found, 1 for the hottest, which is meant where none is given.
+
+    Raises:
+        InputError: for a number that none has.
+    """
+    number = 1 if which is None else which
+    if not 1 <= number <= len(found):
+        allowed = "there is one flow, number 1" if len(found) == 1 else f"choose from 1 (hottest) to {len(found)}"
+        raise InputError(f"--flow {number}: {allowed}")
+    return found[number - 1]
 
 
 def search(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -37,6 +37,7 @@ _MARKERS = {
     "fold-T": ("^", r"fold in $T_\infty$"),
     "density-inversion": ("D", "onset of density inversion"),
     "interior-change": ("v", "change of interior"),
+    "stability-change": ("P", "change of stability"),
 }
 _RESOLUTION = 300
 
@@ -82,9 +83,9 @@ def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
         for i, branch in enumerate(curve.branches):
             colour = _colour(i, curve)
             for run in runs(branch):
-                x, y = (_values(run.flows, name, curve, scales) for name in pair)
+                x, y = (values(run.flows, name, curve, scales) for name in pair)
                 ax.plot(x, y, **style.Stroke(colour, style.OF_DENSITY[run.density]).line())
-        _mark(ax, curve, pair, scales)
+        mark(ax, curve, pair, scales)
         for axis, name in zip("xy", pair, strict=True):
             style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
         style.name_axes(ax, *(style.label(name, scales) for name in pair))
@@ -129,22 +130,25 @@ def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:
     )
 
 
-def _values(flows: Sequence[Flow], name: str, curve: Curve, scales: Scales | None) -> Any:
+def values(flows: Sequence[Any], name: str, curve: Curve, scales: Scales | None) -> Any:
+    """A number of the registry of each flow, scaled."""
     return np.array([getattr(flow, name) for flow in flows]) * factor(name, curve.chute, scales)
 
 
-def _mark(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:
+def mark(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:
+    """Put a marker at each special point of the curve."""
     for branch in curve.branches:
         for point in branch.special:
-            x, y = (_values([point.flow], name, curve, scales) for name in pair)
-            ax.plot(x, y, **_marker(point.kind))
+            x, y = (values([point.flow], name, curve, scales) for name in pair)
+            ax.plot(x, y, **marker(point.kind))
 
 
 def _colour(index: int, curve: Curve) -> str:
     return style.BLACK if len(curve.branches) == 1 else style.stroke(index).colour
 
 
-def _marker(kind: str) -> dict[str, Any]:
+def marker(kind: str) -> dict[str, Any]:
+    """Settings of the marker of a kind of special point."""
     return {
         "marker": _MARKERS.get(kind, ("*", kind))[0],
         "markersize": 4.5,
@@ -167,7 +171,14 @@ def _key(curve: Curve) -> Iterator[Any]:
     for density, dashes in style.OF_DENSITY.items():
         if density in densities:
             yield Line2D([], [], label=f"density {density}", **style.Stroke(style.BLACK, dashes).line())
+    yield from key_of_kinds(curve)
+
+
+def key_of_kinds(curve: Curve) -> Iterator[Any]:
+    """Entries of the legend for the kinds of special points that there are."""
+    from matplotlib.lines import Line2D
+
     found = {point.kind for branch in curve.branches for point in branch.special}
     for kind in KINDS:
         if kind in found:
-            yield Line2D([], [], label=_MARKERS.get(kind, ("*", kind))[1], **_marker(kind))
+            yield Line2D([], [], label=_MARKERS.get(kind, ("*", kind))[1], **marker(kind))

@@ -11,7 +11,6 @@ from chuteflow.analysis.results import FlowSet
 from chuteflow.faces import words
 from chuteflow.faces.plots import parameters
 from chuteflow.faces.stability_records import Answer
-from chuteflow.faces.tables import number
 from chuteflow.paper import style
 
 if TYPE_CHECKING:
@@ -44,9 +43,8 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
             right.set_axis_off()
         else:
             _section(right, mode, top)
-        verdict = "stable" if answer.found is not None and answer.found.stable else "unstable"
         left.set_title(
-            f"{words.among(answer.flow, flows)}: {verdict}, {mode.kind}, growth {number(mode.growth)}",
+            f"{words.among(answer.flow, flows)}: {mode.kind}, growth {mode.growth:.3g}",
             loc="right",
             **style.title(),
         )
@@ -62,7 +60,7 @@ def _profiles(ax: Axes, mode: Mode, top: float) -> None:
     for i, (name, values) in enumerate(zip(_NAMES, fields, strict=True)):
         size = values[shown].max()
         if size > _NOTHING * velocity:
-            ax.plot(values[shown] / size, height[shown], label=f"{name}, {number(size)}", **style.stroke(i).line())
+            ax.plot(values[shown] / size, height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
     ax.set_ylim(0.0, top)
     style.name_axes(ax, "modulus over its largest, as listed", style.label("height"))
     style.legend(ax, loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)

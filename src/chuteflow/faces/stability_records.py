@@ -60,7 +60,7 @@ def mode_object(mode: Mode, *, fields: bool = False) -> dict[str, Any]:
 
 def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
     """A head and one row for each mode, or one for a flow without; empty where there is no number."""
-    rows = [list(COLUMNS)]
+    rows: list[list[str]] = [list(COLUMNS)]
     for answer in answers:
         flow = flow_object(answer.flow)
         start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]

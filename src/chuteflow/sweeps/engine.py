@@ -18,6 +18,7 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
+from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
 from chuteflow.sweeps.study import CHUTE, CONDITIONS, WORDS, Study
@@ -167,7 +168,10 @@ class _Solved:
 
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
-    """Every flow of the batch at the condition's values (n,)."""
+    """Every flow of the batch at the condition's values (n,); none where they are to be judged one by one."""
+    if wanted(study.quantities):
+        none = dict.fromkeys(study.quantities, np.empty(0))
+        return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
         if study.condition == "T_surface":
             flows, unsettled = at_temperature(batch, value, study.largest_holdup, study.tolerance)
@@ -246,7 +250,13 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
         out.status[point] = Status.MORE_FLOWS_THAN_KEPT
     for k, flow in enumerate(found[: study.flows]):
         out.error[point, k] = flow.error
+        known, why = judged(flow) if wanted(study.quantities) else ({}, None)
+        if why is not None:
+            failures[point] = why
         for name, values in out.quantities.items():
+            if name in JUDGED_KINDS or name in JUDGED_NUMBERS:
+                values[point, k] = known.get(name, values[point, k])
+                continue
             value = getattr(flow, name)
             values[point, k] = KINDS[name].index(value) if name in KINDS else value
 

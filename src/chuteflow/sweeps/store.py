@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.steady.quantities import NUMBERS
+from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import Reason, Status, meanings
 from chuteflow.sweeps.study import WORDS, Study, from_canonical
@@ -110,6 +111,9 @@ def _kind(name: str) -> Variable:
 
 
 def _number(name: str) -> Variable:
+    if name in JUDGED_NUMBERS:
+        attributes: dict[str, Any] = {"long_name": JUDGED_NUMBERS[name], "units": "1", "ancillary_variables": "stable"}
+        return Variable("float64", float("nan"), True, attributes)
     quantity = NUMBERS[name]
     attributes = {
         "long_name": quantity.description,

@@ -17,6 +17,7 @@ from chuteflow.errors import InputError
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import DESIGNS, Axis, Design, axis_from, list_design
+from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.laws import LAWS
 
@@ -32,7 +33,7 @@ CONDITIONS = {"T_surface": WIDEST, "Q": (1e-12, 1e12), "M": (1e-12, DEEPEST), "h
 #: Names, and what they are where a study does not give them.
 WORDS = {"surface": (SURFACES, "free"), "closure": (tuple(LAWS), "lun")}
 #: Kinds of a flow that can be kept beside the numbers of the registry.
-KINDS = ("interior", "density")
+KINDS = ("interior", "density", *JUDGED_KINDS)
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 #: Points of a chunk: at a given surface temperature, and otherwise, when more has to be done for each.
 CHUNKS = {"T_surface": 32768}
@@ -141,16 +142,18 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     deepest = _number(search, "search.largest_holdup", LARGEST_HOLDUP, SHALLOWEST, DEEPEST)
     warm = _interval(search.get("surface_temperature", SURFACE_TEMPERATURE))
     Range.checked(warm, deepest)
+    quantities = _quantities(results.get("quantities", list(DEFAULT_QUANTITIES)))
+    chunk = JUDGED_CHUNK if wanted(quantities) else CHUNKS.get(condition, CHUNK)
     study = Study(
         title=str(given.get("title", "")),
         design=design,
         condition=condition,
-        quantities=_quantities(results.get("quantities", list(DEFAULT_QUANTITIES))),
+        quantities=quantities,
         flows=int(_number(results, "results.flows", 8, 1, _MOST_FLOWS, whole=True)),
         tolerance=tolerance,
         surface_temperature=warm,
         largest_holdup=deepest,
-        chunk=int(_number(results, "results.chunk", CHUNKS.get(condition, CHUNK), 1, _MOST_CHUNK, whole=True)),
+        chunk=int(_number(results, "results.chunk", chunk, 1, _MOST_CHUNK, whole=True)),
     )
     object.__setattr__(study, "canonical", _canonical(study, kind, head, parameters))
     return study
@@ -211,7 +214,7 @@ def _check_range(axis: Axis) -> None:
 
 
 def _quantities(names: Any) -> tuple[str, ...]:
-    known = (*NUMBERS, *KINDS)
+    known = (*NUMBERS, *KINDS, *JUDGED_NUMBERS)
     if not isinstance(names, list) or not names:
         raise InputError(f"results.quantities = {names!r}: must be a list of names, from {', '.join(known)}")
     for name in names:

@@ -16,6 +16,7 @@ from chuteflow.analysis.boundaries.system import Sweep
 from chuteflow.analysis.boundaries.tracing import CONTROL, TracedBoundary, traced
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
+from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control
@@ -103,8 +104,13 @@ class BoundarySet(Sequence[Boundary]):
     """Every boundary that was found, the longest first.
 
     ``chute`` gives the other parameters; ``bounds`` is the range of the ``second``, ``sampled`` the values of it at
-    which boundaries were entered: what could be missed is a closed boundary between two of them. ``skipped`` are
-    the values at which the families of flows could not be told apart. ``reason`` says why there is none.
+    which boundaries were entered, and ``families`` those of the flows there. ``skipped`` are the values at which
+    families could not be told apart. ``reason`` says why there is none.
+
+    Complete is this: every boundary is found that passes a sampled value on a family in the range searched, and
+    is followed from end to end. One that begins and ends between two sampled values is looked for from both,
+    where flows come nearest to it; it could be missed if neither shows a sign of it, as where a whole family
+    of flows exists between them alone.
     """
 
     chute: Chute
@@ -113,6 +119,7 @@ class BoundarySet(Sequence[Boundary]):
     bounds: tuple[float, float]
     boundaries: tuple[Boundary, ...]
     sampled: tuple[float, ...]
+    families: tuple[tuple[TracedFamily, ...], ...] = field(repr=False)
     skipped: tuple[float, ...]
     searched: Searched
     tolerance: float
@@ -153,7 +160,7 @@ def boundary(
         second: "slope", "restitution", "wall_restitution" or "roughness".
         bounds: the range of the second parameter.
         samples: values of it, evenly over the range, at which all families of flows are searched for points of
-            boundaries; each boundary is then followed over the whole range, once.
+            boundaries, and for signs of boundaries beside them; each is then followed over the whole range, once.
         tolerance: relative error allowed in Q, h, M and the second parameter, from 1e-11 to 1e-3.
         surface_temperature: range of T_surface.
         largest_holdup: largest M.
@@ -171,6 +178,7 @@ def boundary(
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
+    entered: list[tuple[TracedFamily, ...]] = []
     skipped: list[float] = []
 
     def follow(points: Iterator[BoundaryPoint], share: float) -> None:
@@ -190,6 +198,7 @@ def boundary(
             skipped.append(value)
             continue
         sampled.append(value)
+        entered.append(tuple(families))
         for condition in seeds.conditions(of):
             follow(seeds.on_families(sweep, condition, value, families, spacing, tolerance), share)
     for condition in seeds.conditions(of):
@@ -197,7 +206,7 @@ def boundary(
             for value in seeds.whatever_the_flow(sweep, condition, low, high):
                 families = seeds.families_at(sweep, value, within)
                 follow(seeds.along_families(sweep, condition, value, families, tolerance), 1.0)
-    boundaries = sorted((_result(of, second, b) for b in found), key=lambda b: -len(b.flows))
+    boundaries = sorted((as_boundary(of, second, b) for b in found), key=lambda b: -len(b.flows))
     return BoundarySet(
         chute=chute,
         kind=of,
@@ -205,6 +214,7 @@ def boundary(
         bounds=(sweep.low, sweep.high),
         boundaries=tuple(boundaries),
         sampled=tuple(sampled),
+        families=tuple(entered),
         skipped=tuple(skipped),
         searched=Searched((within.coldest, within.hottest), within.deepest),
         tolerance=tolerance,
@@ -226,7 +236,7 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
     return sweep
 
 
-def _families(sweep: Sweep, value: float, spacing: float, within: Range) -> tuple[list | None, float]:
+def _families(sweep: Sweep, value: float, spacing: float, within: Range) -> tuple[list[TracedFamily] | None, float]:
     """The families of flows at a value of the parameter, or close by where they cannot be told apart just there."""
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))
@@ -237,9 +247,10 @@ def _families(sweep: Sweep, value: float, spacing: float, within: Range) -> tupl
     return None, value
 
 
-def _result(of: str, second: str, found: TracedBoundary) -> Boundary:
+def as_boundary(kind: str, second: str, found: TracedBoundary) -> Boundary:
+    """A boundary that was traced, of a ``kind`` and through a ``second`` parameter."""
     return Boundary(
-        kind=of,
+        kind=kind,
         second=second,
         flows=tuple(point.flow for point in found.points),
         error=np.array([point.error for point in found.points]),

@@ -199,6 +199,21 @@ class InteriorChange(_OfFields):
         return float(row @ state.net_loss), by_z, float(row @ at.stepped.net_loss.imag) / IMAGINARY_STEP
 
 
+@dataclass(frozen=True, eq=False)
+class Held(_OfFields):
+    """The macroscopic quantity ``which``, a logarithm, has a ``value``."""
+
+    which: int
+    value: float
+
+    def __call__(self, at: Local) -> tuple[float, Array, float]:
+        """See :class:`Condition`."""
+        which = self.which
+        by_parameter = float(at.stepped.macroscopic()[which].imag) / IMAGINARY_STEP
+        off = float(at.state.macroscopic()[which]) - self.value
+        return off, at.state.macroscopic_gradient()[which], by_parameter
+
+
 def along(at: Local, direction: Array) -> State:
     """The state an imaginary step along a direction (n+3,) of the unknowns: its imaginary parts, over
     IMAGINARY_STEP, are derivatives along it."""

@@ -67,9 +67,12 @@ def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance
 
 def shift(system: BoundarySystem, w: Array, row: Array) -> float:
     """How far the parameter is from the boundary, by the first step of Newton's method in the plane across ``row``
-    (3,) through ``w``."""
+    (3,) through ``w``; infinitely far where the parameter has no say in it."""
     residual, jacobian = _bordered(system, w, row, float(row @ w[-3:]))
-    return -float(np.linalg.solve(jacobian, residual)[-1])
+    try:
+        return -float(np.linalg.solve(jacobian, residual)[-1])
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def through(system: BoundarySystem, w: Array, tolerance: float) -> BoundaryPoint:

@@ -449,7 +449,10 @@ def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
     widths = gaps[first + np.arange(points - 1)[:, None]] / gaps[np.minimum(here, count - 2)]
     at = np.concatenate([np.zeros((1, count)), np.cumsum(widths, axis=0)])
     off = at[here - first, here] - at
-    out = np.zeros_like(values)
+    aside = points // 2
+    ends = np.append(here[:aside], here[-aside:])
+    inner = np.zeros((*values.shape[:-1], count - 2 * aside))
+    outer = np.zeros((*values.shape[:-1], 2 * aside))
     for j in range(points):
         others = [k for k in range(points) if k != j]
         own = here - first == j
@@ -457,7 +460,9 @@ def _through(values: Array, gaps: Array, points: int) -> tuple[Array, Array]:
         product = np.prod([np.where(here - first == k, 1.0, off[k]) for k in others], axis=0)
         weight = product / np.prod([at[j] - at[k] for k in others], axis=0)
         weight[own] = np.sum([1.0 / off[k][own] for k in others], axis=0)
-        out += weight * values[..., first + j]
+        inner += weight[aside:-aside] * values[..., j : count - 2 * aside + j]
+        outer += weight[ends] * values[..., first[ends] + j]
+    out = np.concatenate([outer[..., :aside], inner, outer[..., aside:]], axis=-1)
     return out, widths
 
 

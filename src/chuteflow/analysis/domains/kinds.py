@@ -37,7 +37,7 @@ _TURN = 1e-6
 #: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
-_BALANCE, _DEEP, _RISE = 2e-3, 10.0, 1.5e-3
+_BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 #: Closed lines that span fewer columns and rows are none; those that span more are, wherever they are; those in
 #: between only so many columns or rows beside other lines.
 _SMALLEST_LOOP, _SMALL_LOOP, _BESIDE = 1.5, 6.0, 8.0
@@ -45,6 +45,8 @@ _SMALLEST_LOOP, _SMALL_LOOP, _BESIDE = 1.5, 6.0, 8.0
 _NEAR = 0.3
 #: Cubic interpolation is used where neighbouring steps of the grid differ by less than this factor.
 _EVEN = 12.0
+#: Weights of a cubic whose sizes sum to more extrapolate.
+_SOUND = 3.0
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,11 @@ def _at_zeros(fan: Fan, excess: Array, line: Array) -> _Zeros:
     if even.any():
         at = np.concatenate([np.zeros((1, len(line))), np.cumsum(widths, axis=0)])[:, even] / unit[even]
         low = at[aside[even], np.arange(at.shape[1])]
-        weights[:, even] = lagrange(at, _zero_of_cubic(at, values[:, even], low, low + share[even]))
+        cubic = lagrange(at, _zero_of_cubic(at, values[:, even], low, low + share[even]))
+        # Between the inner two of four values these weights are small; a cubic without a zero there has none.
+        sound = np.abs(cubic).sum(axis=0) < _SOUND
+        even[even] = sound
+        weights[:, even] = cubic[:, sound]
     values = fan.fields[:, r, c]
     fields = (values * weights).sum(axis=1)
     # Where there is no cubic, half of what lies between the ends of an edge; else what the cubic differs by.

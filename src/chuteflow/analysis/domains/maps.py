@@ -33,7 +33,7 @@ TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
 #: Places along a column that are always looked at: at first, and later.
-_GUARDS, _LATER_GUARDS = 33, 9
+_GUARDS, _LATER_GUARDS = 24, 8
 #: Progress: columns done, and columns known to be needed.
 Progress = Callable[[int, int], None]
 

@@ -13,5 +13,7 @@ COMMANDS = {
     "report": "One page with every figure and claim of the paper, recomputed, and verdicts.",
     "explore": "A page in the browser: drag every parameter, and see every flow.",
     "stability": "Which flows are stable, and the disturbance that grows fastest.",
+    "growth": "Growth rates of a flow over wavenumbers along and across the slope, and its neutral curves.",
+    "neutral": "Growth of waves in one direction along a family of flows, and the neutral curves.",
     "relax": "Follow a disturbed flow in time, to the steady flow that it comes to.",
 }

@@ -149,7 +149,10 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
     yield words.searched(found.searched, found.chute, None)
-    yield f"entered at {len(found.sampled)} values of {second}: a closed boundary between two of them could be missed"
+    yield (
+        f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
+        "neither come near, could be missed"
+    )
     if found.skipped:
         yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
     from chuteflow.analysis.results import Branch, Curve
+    from chuteflow.stability.along import MarkedBranch, MarkedCurve
     from chuteflow.steady.quantities import Scales
 
 _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --search-temperature 0.01:500"
@@ -20,6 +23,8 @@ _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6
 @click.command("curve", help=COMMANDS["curve"], epilog=_EPILOG)
 @options.chute_options
 @options.option("--points", type=click.INT, help="Flows on the longest branch; 200 by default.")
+@click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
+@options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
 @options.search_options
 @options.output_options
 @options.scale_options
@@ -28,27 +33,53 @@ def command(**given: Any) -> None:
     chute = options.chute(given)
     scales = options.scales(given)
     options.require_outputs(given)
+    if given["samples"] is not None and not given["stability"]:
+        raise InputError("--samples counts the flows judged with --stability: give both")
     from chuteflow.analysis.curve import curve
 
     points = {} if given["points"] is None else {"points": given["points"]}
     found = curve(chute, **points, **options.search(given))
+    judged = _judged(found, given["samples"]) if given["stability"] else None
+    if judged is not None:
+        found = judged.curve
     if given["save"]:
         from chuteflow.faces.files import save
 
         save(found, given["save"], scales=scales)
     if given["plot"]:
         from chuteflow.faces.plots import plot_curve, write_figure
+        from chuteflow.faces.stability_curve import plot_marked
 
-        write_figure(plot_curve(found, scales=scales), given["plot"])
+        figure = plot_curve(found, scales=scales) if judged is None else plot_marked(judged, scales=scales)
+        write_figure(figure, given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
 
-        click.echo(contract.text(contract.curve_object(found, scales)))
+        content = contract.curve_object(found, scales)
+        if judged is not None:
+            from chuteflow.faces.stability_curve import samples_objects
+
+            for branch, samples in zip(content["branches"], samples_objects(judged, scales), strict=True):
+                branch["stability"] = samples
+        click.echo(contract.text(content))
     else:
-        click.echo("\n".join(_report(found, scales)))
+        click.echo("\n".join(_report(found, judged, scales)))
 
 
-def _report(found: Curve, scales: Scales | None) -> Iterator[str]:
+def _judged(found: Curve, samples: int | None) -> MarkedCurve:
+    from chuteflow.stability.along import marked
+
+    def progress(share: float) -> None:
+        if sys.stderr.isatty():
+            click.echo(f"\r\x1b[K{share:.0%} of the flows judged", nl=False, err=True)
+
+    judged = marked(found, progress=progress, **({} if samples is None else {"samples": samples}))
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[K", nl=False, err=True)
+    return judged
+
+
+def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> Iterator[str]:
     from chuteflow.faces import words
 
     yield words.chute(found.chute)
@@ -58,12 +89,22 @@ def _report(found: Curve, scales: Scales | None) -> Iterator[str]:
         yield ""
         yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
         yield _points(branch, found, scales)
+        if judged is not None:
+            yield _stretches(judged.branches[i - 1], found, scales)
     yield ""
     if found.branches:
         yield words.multiplicity(found, scales)
     else:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
     yield words.searched(found.searched, found.chute, scales)
+
+
+def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
+    """Stable and unstable stretches of a family in words."""
+    from chuteflow.faces.stability_curve import stretch
+
+    said = [stretch(run, found.chute, scales) for run in branch.runs]
+    return f"stability, by {len(branch.samples)} flows: " + "; ".join(said)
 
 
 def _points(branch: Branch, found: Curve, scales: Scales | None) -> str:

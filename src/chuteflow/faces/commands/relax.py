@@ -69,7 +69,7 @@ def command(**given: Any) -> None:
         empty = {"chute": contract.chute_object(found.chute), "flows": [], "reason": found.reason}
         click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
         return
-    flow = _chosen(found, given["which"])
+    flow = options.chosen(found, given["which"])
     layer, start = _start(flow, given["heat"], given["push"])
     moments = _followed(layer, start, duration)
     end = outcome(layer, moments)
@@ -87,14 +87,6 @@ def _found(given: Mapping[str, Any]) -> FlowSet:
     chute = options.chute(given)
     asked: dict[str, Any] = options.condition(given, chute, None)
     return flows(chute, **asked)
-
-
-def _chosen(found: FlowSet, which: int | None) -> Flow:
-    number = 1 if which is None else which
-    if not 1 <= number <= len(found):
-        allowed = "there is one flow, number 1" if len(found) == 1 else f"choose from 1 (hottest) to {len(found)}"
-        raise InputError(f"--flow {number}: {allowed}")
-    return found[number - 1]
 
 
 def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:

@@ -20,6 +20,7 @@ from chuteflow.faces.explorer import queries, sentences
 from chuteflow.faces.explorer.queries import GRAINS, Query
 from chuteflow.faces.explorer.recipes import recipes
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS
 
 #: Relative error allowed: far below what can be seen on a page. Exports are exact.
 _VISIBLE = 1e-6
@@ -73,15 +74,25 @@ def _flows(query: Query) -> Answer:
     flux, scales = queries.flux(other["Q"]), queries.scales(other)
     found = flows(chute, Q=flux, tolerance=_VISIBLE)
     top = _TOP * max((flow.centre_of_mass for flow in found), default=1.0)
-    content = contract.flow_set_object(found)
-    for flow, entry in zip(found, content["flows"], strict=True):
-        entry |= {
+    shown = [
+        {
+            **{NUMBERS[name].symbol: getattr(flow, name) for name in contract.PLACE},
+            "error": flow.error,
             "profile": _profile(flow, top),
             "budget": asdict(flow.energy_budget) | {"heat_from_base": flow.energy_budget.heat_from_base},
             **sentences.of_flow(flow, found),
         }
-    says = sentences.of_flows(found, flux, scales)
-    return _json(content | {"top": top, "says": says, "recipes": recipes(chute, flux, scales)})
+        for flow in found
+    ]
+    return _json(
+        {
+            "chute": contract.chute_object(chute),
+            "flows": shown,
+            "top": top,
+            "says": sentences.of_flows(found, flux, scales),
+            "recipes": recipes(chute, flux, scales),
+        }
+    )
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
@@ -110,8 +121,7 @@ def _curve(query: Query) -> Answer:
 
 
 def _rounded(branch: Branch) -> dict[str, list[float]]:
-    names = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}
-    return {symbol: _short(getattr(branch, name)) for symbol, name in names.items()}
+    return {NUMBERS[name].symbol: _short(getattr(branch, name)) for name in contract.PLACE}
 
 
 def _map(query: Query) -> Answer:

@@ -5,34 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
-from chuteflow.analysis.domains.columns import halved
-from chuteflow.analysis.domains.plane import SUMMARY, Axis, Plane, summary
+from chuteflow.analysis.domains.columns import Part, column
+from chuteflow.analysis.domains.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
 from chuteflow.faces.contract import PARAMETERS
 from chuteflow.faces.explorer.queries import CONTROLS
 from chuteflow.steady.chute import Chute
 
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
-#: where every point has trajectories of its own.
-_FIRST = 9
-_TOLERANCE = {True: 0.008, False: 0.016}
+#: where every point has trajectories of its own, finer for what is known in closed form.
+_FIRST, _FIRST_HOT = 9, 33
+_TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 _OF_BASE = ("ew", "roughness")
 
 
 @dataclass(frozen=True)
 class MapColumn:
-    """Classes along the axis ``inner`` where ``outer`` is ``at``; both are names of a query.
+    """What chutes are like along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
 
-    ``codes`` (integers in the order of ``names``) has one entry more than ``stops``, the values of ``inner``,
-    ascending, between them; ``tolerance`` is how far these may be off.
+    ``parts`` are by name "most" (flows that share a flux), "families", "interior" and "density" (bits, see
+    :mod:`chuteflow.analysis.domains.kinds`), and "hot" (1 where there are flows at every high temperature, -1
+    where the theory does not say). Their stops are values of ``inner``, which may be off by ``tolerance``.
     """
 
     outer: str
     inner: str
     at: float
-    stops: tuple[float, ...]
-    codes: tuple[tuple[int, ...], ...]
+    parts: dict[str, Part]
     tolerance: float
-    names: tuple[str, ...] = SUMMARY
 
 
 def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
@@ -44,14 +43,17 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
     plane = _plane(chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
-    first = [(i + 0.5) / _FIRST for i in range(_FIRST)]
-    stops, codes = halved(place, partial(summary, plane), first, tolerance)
+    found = column(place, partial(summary, plane), _evenly(_FIRST), tolerance)
+    # Narrower bands are where the search happened to meet them.
+    parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
+    if plane.chute.surface == "free":
+        hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
+        parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(
         outer,
         inner,
         float(plane.outer.at(place)),
-        tuple(float(plane.inner.at(stop)) for stop in stops),
-        tuple(codes),
+        {name: Part(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
 
@@ -60,3 +62,7 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
 def _plane(chute: Chute, x: str, y: str) -> Plane:
     across, up = (Axis(PARAMETERS[name], CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
     return Plane(across, up, chute, ())
+
+
+def _evenly(count: int) -> list[float]:
+    return [(i + 0.5) / count for i in range(count)]

@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 _COUNTS = ("No flow carries", "One flow carries", "Two flows share", "Three flows share", "Four flows share")
 _INVERTED = ", densest above its base"
-_WAVES = {"along": "waves along the slope", "across": "waves across the slope", "oblique": "oblique waves"}
+_WAVES = {
+    "along": "waves along the slope",
+    "across": "waves across the slope",
+    "oblique": "oblique waves",
+    "uniform": "as a whole",
+}
 
 
 def of_flow(flow: Flow, among: FlowSet) -> dict[str, str]:
@@ -49,23 +54,21 @@ def of_curve(found: Curve, scales: Scales | None) -> str:
 
 def of_stability(known: Verdict, chute: Chute, scales: Scales | None) -> str:
     """Whether a flow is stable, and against what."""
-    if known.tried is None:
+    if known.state == "unknown":
         return f"not known whether it is stable: {known.reason}"
     wave = known.fastest
     if wave is None:
-        return "stable: none of the waves tried grows"
-    return (
-        f"unstable: {_WAVES[wave.direction]}, growth {_rate(wave.growth, chute, scales)}, "
-        f"wavelength {_length(wave.length, chute, scales)}"
-    )
+        return "stable: no wave grows"
+    says = f"unstable: {_WAVES[wave.direction]}, growth {_rate(wave.growth, chute, scales)}"
+    return says if wave.length is None else f"{says}, wavelength {_length(wave.length, chute, scales)}"
 
 
 def of_waves(known: Verdict, chute: Chute, scales: Scales | None) -> str:
-    """How much of the question of stability was asked."""
-    if known.tried is None:
+    """Which waves were looked at."""
+    if known.searched is None:
         return ""
-    shortest, longest = (_length(length, chute, scales) for length in (known.tried.shortest, known.tried.longest))
-    return f"{known.tried.waves} waves of {shortest} to {longest} tried"
+    shortest, longest = (_length(length, chute, scales) for length in known.searched)
+    return f"waves of {shortest} to {longest} searched"
 
 
 def _amount(name: str, value: float, chute: Chute, scales: Scales | None) -> str:

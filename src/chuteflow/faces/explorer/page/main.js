@@ -72,10 +72,10 @@ onChange((has) => {
     document.documentElement.dataset.theme = state.theme;
     forgetColours();
   }
-  showControls();
   const words = has("si", "d", "rho");
   if (ofChute(has) || has("Q") || words) askFlows();
   if (ofChute(has) || words) askCurve();
+  showControls();
   if (has("Q", "against", "whole")) curve.redraw();
   if (has("flow") || ofLooks(has)) showFlows();
   map.changed(has);
@@ -100,8 +100,15 @@ function showFlows() {
   stability.show();
   drawProfiles(list, flows.top, k);
   curve.takeFlows(list, k);
-  chutePicture.show(list[k] ?? null, Number(flows.chute.slope), flowColour(k));
-  drawBudget(list[k], k);
+  // The rest comes a frame later, so that flows and profiles follow the slider as closely as they can.
+  requestAnimationFrame(() => setTimeout(showRest));
+}
+
+/** Panels of the chosen flow alone, and how to compute it. */
+function showRest() {
+  const flow = flows.flows[chosen()] ?? null;
+  chutePicture.show(flow, Number(flows.chute.slope), flowColour(chosen()));
+  drawBudget(flow, chosen());
   byId("command").textContent = flows.recipes.command;
   byId("python").textContent = flows.recipes.python;
 }

@@ -16,7 +16,6 @@ const shadings = {
   density: { label: "density", says: "Densities among the flows", value: (bits) => bits, name: (bits) => ["no flow", "monotonic", "inverted", "both"][bits] },
   interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
 };
-const shading = () => (shadings[state.shade] ? state.shade : "most");
 // Columns to begin with, and how narrow the stretches between columns may become.
 const first = 8, finest = 64;
 let about = null, set = null, failure = "", shown = null, holding = false;
@@ -42,7 +41,7 @@ export function begin(given, setter) {
 /** After a change of the state: a new map where anything but the cross-hair moved. */
 export function changed(has) {
   for (const axis of ["x", "y"]) selects[axis].value = state[axis];
-  byId("shade").value = shading();
+  byId("shade").value = state.shade;
   // A cross-hair that moves asks nothing: one map serves all of its positions.
   const moved = has("x", "y", "surface", "closure") || names.some((name) => has(name) && name !== state.x && name !== state.y);
   if (moved || has("shade")) asking.begin();
@@ -78,31 +77,26 @@ function take(query, found, all) {
   redraw();
 }
 
-/** A column by what is shown alone: its stops, and between them the value that is shaded and whether it is hot. */
-function shownOf(column) {
-  const by = column.names.indexOf(shading()), hot = column.names.indexOf("hot"), stops = [], classes = [];
-  column.codes.forEach((code, k) => {
-    const here = { value: shadings[shading()].value(code[by]), hot: code[hot] > 0 }, last = classes.at(-1);
-    if (last && last.value === here.value && last.hot === here.hot) return;
-    if (k) stops.push(column.stops[k - 1]);
-    classes.push(here);
-  });
-  return { at: column.at, stops, classes };
+/** What of a column is shaded. */
+function shaded({ parts }) {
+  const { stops, values } = parts[state.shade], told = values.map(shadings[state.shade].value);
+  const kept = stops.map((_, i) => i).filter((i) => told[i] !== told[i + 1]);
+  return { stops: kept.map((i) => stops[i]), values: [told[0], ...kept.map((i) => told[i + 1])] };
 }
 
-const same = (a, b) => a.value === b.value && a.hot === b.hot;
-const alike = (a, b) => a.classes.length === b.classes.length && a.classes.every((one, k) => same(one, b.classes[k]));
+const alike = (a, b) => String(a.values) === String(b.values);
 
 /** Where the stops of two columns are half-way between them: those that correspond, from either end, meet there. */
 function middles(a, b) {
   const [n, m] = [a.stops.length, b.stops.length], ends = [[...a.stops], [...b.stops]];
   const meet = (i, j) => { ends[0][i] = ends[1][j] = (a.stops[i] + b.stops[j]) / 2; };
+  const same = (i, j) => a.values[i] === b.values[j] && a.values[i + 1] === b.values[j + 1];
   let low = 0, high = 0;
-  while (low < Math.min(n, m) && same(a.classes[low], b.classes[low]) && same(a.classes[low + 1], b.classes[low + 1])) { meet(low, low); low++; }
-  while (high < Math.min(n, m) - low && same(a.classes[n - high], b.classes[m - high]) && same(a.classes[n - high - 1], b.classes[m - high - 1])) { high++; meet(n - high, m - high); }
+  while (low < Math.min(n, m) && same(low, low)) { meet(low, low); low++; }
+  while (high < Math.min(n, m) - low && same(n - high - 1, m - high - 1)) { high++; meet(n - high, m - high); }
   // The others stay where they are, as far as those that meet let them.
   for (const stops of ends) for (let k = low; k < stops.length - high; k++) {
-    stops[k] = Math.max(stops[k], low ? stops[low - 1] : -Infinity);
+    if (low) stops[k] = Math.max(stops[k], stops[low - 1]);
     if (high) stops[k] = Math.min(stops[k], stops[stops.length - high]);
   }
   return ends;
@@ -110,7 +104,7 @@ function middles(a, b) {
 
 /** Middles of the stretches between columns whose classes do not follow from one another. */
 function narrower(found) {
-  const seen = found.map(shownOf), places = [];
+  const seen = found.map(shaded), places = [];
   for (let i = 1; i < found.length; i++) {
     const width = found[i].place - found[i - 1].place, follows = alike(seen[i - 1], seen[i]);
     if (width > 1.5 / finest && (!follows || (width > 1.5 / (4 * first) && seen[i].stops.length))) places.push((found[i - 1].place + found[i].place) / 2);
@@ -118,24 +112,26 @@ function narrower(found) {
   return places;
 }
 
+/** For each two halves of a stretch between columns: where they begin and end, and stops and values there. */
+function* halves(found, part) {
+  for (let i = 1; i < found.length; i++) {
+    const [a, b] = [part(found[i - 1]), part(found[i])], [from, to] = [found[i - 1].at, found[i].at], middle = (from + to) / 2;
+    const [left, right] = middles(a, b);
+    yield [from, middle, a.stops, left, a.values];
+    yield [middle, to, right, b.stops, b.values];
+  }
+}
+
 /** Areas of one value, and lines between hot and not, in the coordinates of the map. */
 function pieces(found, x) {
   const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
   const at = (o, i) => (outer === x ? [o, i] : [i, o]);
-  const slab = (from, to, left, right, classes) => {
-    const [start, end] = [left, right].map((stops) => [low, ...stops, high]);
-    classes.forEach(({ value, hot }, k) => {
-      if (!areas.has(value)) areas.set(value, []);
-      areas.get(value).push([at(from, start[k]), at(to, end[k]), at(to, end[k + 1]), at(from, start[k + 1])]);
-      if (k && hot !== classes[k - 1].hot) lines.push([at(from, start[k]), at(to, end[k])]);
-    });
-  };
-  const seen = found.map(shownOf);
-  for (let i = 1; i < seen.length; i++) {
-    const [a, b] = [seen[i - 1], seen[i]], middle = (a.at + b.at) / 2, [left, right] = middles(a, b);
-    slab(a.at, middle, a.stops, left, a.classes);
-    slab(middle, b.at, right, b.stops, b.classes);
-  }
+  for (const [from, to, start, end, values] of halves(found, shaded)) values.forEach((value, k) => {
+    if (!areas.has(value)) areas.set(value, []);
+    const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
+    areas.get(value).push([at(from, p[0]), at(to, q[0]), at(to, q[1]), at(from, p[1])]);
+  });
+  for (const [from, to, start, end] of halves(found, (column) => column.parts.hot)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
   return { areas, lines };
 }
 
@@ -156,7 +152,7 @@ export function redraw() {
     const { low, high, label, symbol } = about.controls[name];
     return { low, high, label: `${label.toLowerCase()} ${symbol.replace("_w", "w")}` };
   };
-  const { says, name } = shadings[shading()], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
+  const { says, name } = shadings[state.shade], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
   const shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
   shown = draw(svg, {
     x: axis(state.x), y: axis(state.y),

@@ -5,6 +5,12 @@ const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
 const defaults = {
   si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", x: "slope", y: "roughness", shade: "most",
 };
+// What can be chosen from few; numbers and names of the chute are checked by the server, which says what is wrong.
+const parameters = ["slope", "e", "ew", "roughness"];
+const allowed = {
+  si: ["", "1"], whole: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
+  shade: ["most", "families", "density", "interior"],
+};
 let first = {}, due = null;
 export const state = {};
 
@@ -15,8 +21,9 @@ export function start(preset) {
 }
 
 function fromAddress() {
-  const given = new URLSearchParams(location.search);
-  return Object.fromEntries(Object.entries(first).map(([name, value]) => [name, given.get(name) ?? value]));
+  const given = new URLSearchParams(location.search), known = (name) => given.has(name) && (allowed[name]?.includes(given.get(name)) ?? true);
+  const taken = Object.fromEntries(Object.entries(first).map(([name, value]) => [name, known(name) ? given.get(name) : value]));
+  return taken.x === taken.y ? { ...taken, x: defaults.x, y: defaults.y } : taken;
 }
 
 /** Change parts of the state, tell the listeners which, and put it into the address. */

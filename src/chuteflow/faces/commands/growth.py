@@ -1,0 +1,145 @@
+"""``chuteflow growth``: growth rates of one flow over wavenumbers along and across the slope, and neutral curves."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from chuteflow.faces import options
+from chuteflow.faces.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from chuteflow.stability.planes import WaveMap
+
+#: Endings of the files that --save writes.
+SAVED = (".csv", ".json")
+_EPILOG = (
+    "Rates are in sqrt(g cos(theta)/d), wavenumbers in 1/d. A map of 40x40 takes about half a minute.\n\n"
+    "Example: chuteflow growth --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --size 12x12"
+)
+
+
+class Size(click.ParamType):
+    """Two whole numbers as MxN."""
+
+    name = "mxn"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Both numbers."""
+        try:
+            m, n = map(int, str(value).lower().split("x"))
+        except ValueError:
+            self.fail(f"{value!r} is not a size: write two whole numbers as MxN, for example 40x40", param, ctx)
+        return m, n
+
+
+@click.command("growth", help=COMMANDS["growth"], epilog=_EPILOG)
+@options.chute_options
+@options.condition_options
+@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.option(
+    "--kx", type=options.Interval(), help="Wavenumbers along the slope; by default to three times that of the maximum."
+)
+@options.option("--ky", type=options.Interval(), help="Wavenumbers across the slope.")
+@options.option("--size", type=Size(), help="Points along kx and ky; 40x40 by default.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+@options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
+def command(**given: Any) -> None:
+    """Solve, map, print, save and draw."""
+    require_outputs(given)
+    chute = options.chute(given)
+    condition: dict[str, Any] = options.condition(given, chute, None)
+    from chuteflow.analysis.enumeration import flows
+    from chuteflow.faces import contract
+
+    found = flows(chute, **condition)
+    if not len(found):
+        empty = {"chute": contract.chute_object(chute), "flow": None, "reason": found.reason}
+        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        return
+    flow = options.chosen(found, given["which"])
+    from chuteflow.faces.growth_records import wave_object, wave_rows
+    from chuteflow.stability.planes import wave_map
+
+    size = {} if given["size"] is None else {"size": given["size"]}
+    mapped = wave_map(flow, kx=given["kx"], ky=given["ky"], progress=progress, **size)
+    clear()
+    write(given, wave_object(mapped), wave_rows(mapped))
+    if given["plot"] is not None:
+        from chuteflow.faces.growth_plot import plot_wave_map
+        from chuteflow.faces.plots import write_figure
+
+        write_figure(plot_wave_map(mapped), given["plot"])
+    click.echo(contract.text(wave_object(mapped)) if given["as_json"] else "\n".join(_report(mapped)))
+
+
+def require_outputs(given: Mapping[str, Any]) -> None:
+    """Check that files can be written.
+
+    Raises:
+        InputError: for one that cannot.
+    """
+    from chuteflow.faces.writing import require_writable
+
+    for name, suffixes in (("save", SAVED), ("plot", options.DRAWN)):
+        if given[name] is not None:
+            require_writable(given[name], suffixes)
+
+
+def write(given: Mapping[str, Any], content: Mapping[str, Any], rows: Iterator[list[str]]) -> None:
+    """Write what --save asks for."""
+    if given["save"] is None:
+        return
+    from chuteflow.faces import contract
+    from chuteflow.faces.writing import written_beside
+
+    as_json = given["save"].lower().endswith(".json")
+    text = contract.text(content) if as_json else "\n".join(",".join(row) for row in rows)
+    with written_beside(given["save"]) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
+
+
+def progress(share: float) -> None:
+    """How much of the map is done, on a terminal."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\x1b[K{share:.0%} of the map", nl=False, err=True)
+
+
+def clear() -> None:
+    """Take the progress away."""
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[K", nl=False, err=True)
+
+
+def _report(found: WaveMap) -> Iterator[str]:
+    from chuteflow.faces import tables, words
+
+    flow = found.flow
+    yield words.chute(flow.chute)
+    yield f"flow: Q = {tables.number(flow.mass_flux)}, h = {tables.number(flow.centre_of_mass)}"
+    yield ""
+    growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
+    i, j = np.unravel_index(int(growth.argmax()), growth.shape)
+    yield (
+        f"largest growth on the map: {tables.number(float(growth[i, j]))} at kx = {tables.number(float(found.kx[i]))}, "
+        f"ky = {tables.number(float(found.ky[j]))}"
+    )
+    yield f"growing: {int((growth > 0.0).sum())} of {growth.size} points"
+    hidden = int(np.isnan(found.growth).sum())
+    if hidden:
+        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+    yield ""
+    if not found.neutral:
+        yield "no neutral curve in this range"
+        return
+    rows = [["neutral curve", "points", "from kx", "ky", "to kx", "ky", "error", "ends at"]]
+    for number, curve in enumerate(found.neutral, 1):
+        ends = [tables.number(float(value)) for z in (curve.z[0], curve.z[-1]) for value in z]
+        where = curve.ends[1] if curve.ends[0] == curve.ends[1] else "; ".join(curve.ends)
+        rows.append([str(number), str(len(curve.z)), *ends, f"{curve.error.max():.0e}", where])
+    yield tables.table(rows, words=(7,))

@@ -1,0 +1,94 @@
+"""Pictures of growth rates: shades and contours over a plane of wavenumbers or along a family, with neutral curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow.faces.plots import parameters
+from chuteflow.paper import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chuteflow.stability.planes import FamilyMap, WaveMap
+
+#: Shades of growth on either side of zero, and the largest decay that is told from the rest, over the largest growth.
+_SHADES, _DEEPEST = 8, 2.0
+_MAP_OF_COLOURS = "RdBu_r"
+_NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
+
+
+def plot_wave_map(found: WaveMap) -> Figure:
+    """Growth over wavenumbers along and across the slope."""
+    figure, (ax,) = style.panels(1, width=5.2, height=4.2)
+    _shaded(figure, ax, found.kx, found.ky, found.growth)
+    for curve in found.neutral:
+        ax.plot(*curve.z.T, **_NEUTRAL.line(1.6))
+    growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
+    i, j = np.unravel_index(int(growth.argmax()), growth.shape)
+    if growth[i, j] > 0.0:
+        ax.plot(
+            found.kx[i], found.ky[j], marker="+", markersize=8.0, color=style.BLACK, clip_on=False, linestyle="none"
+        )
+    style.name_axes(ax, "wavenumber along the slope, $k_x$", "wavenumber across the slope, $k_y$")
+    ax.set_xlim(found.kx[0], found.kx[-1])
+    ax.set_ylim(found.ky[0], found.ky[-1])
+    flow = found.flow
+    place = rf"$Q = {flow.mass_flux:.4g}$, $h = {flow.centre_of_mass:.4g}$"
+    style.caption(figure, f"{parameters(flow.chute)}\n{place}; bold: neutral")
+    return figure
+
+
+def plot_family_map(found: FamilyMap) -> Figure:
+    """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
+    figure, (left, right) = style.panels(2, width=7.6, height=3.7)
+    warmth = np.array([flow.surface_temperature for flow in found.flows])
+    place = np.linspace(0.0, 1.0, len(warmth))
+    _shaded(figure, left, found.depth_wavenumber, place, found.growth)
+    left.set_xscale("log")
+    ticks = np.linspace(0, len(warmth) - 1, 6).round().astype(int)
+    left.set_yticks(place[ticks], [f"{warmth[i]:.3g}" for i in ticks])
+    left.set_ylim(0.0, 1.0)
+    for i, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True)):
+        left.plot(*curve.z.T, **_NEUTRAL.line(1.6))
+        flux = [flow.mass_flux for flow in flows]
+        right.plot(flux, curve.z[:, 0], label=f"neutral curve {i + 1}", **style.stroke(i).line())
+    style.name_axes(left, "$k h$", r"$T_\infty$ along the family")
+    style.name_axes(right, style.label("mass_flux"), "$k h$")
+    style.spread_scale(right, "x", [[flow.mass_flux for flow in flows] for flows in found.neutral_flows])
+    right.set_yscale("log")
+    if found.neutral:
+        style.legend(right)
+    waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
+        found.angle, f"waves at {found.angle:g} degrees to the slope"
+    )
+    style.caption(figure, f"{parameters(found.flows[0].chute)}; {waves}; bold: neutral")
+    return figure
+
+
+def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any) -> None:
+    """Shades that are white at zero growth; what decays fast, or is hidden by the continuous spectrum, is deep."""
+    from matplotlib.ticker import MaxNLocator
+
+    largest = float(np.nanmax(growth, initial=0.0)) or float(np.nanmax(np.abs(growth), initial=1e-12))
+    shown = np.clip(np.nan_to_num(growth, nan=-np.inf), -_DEEPEST * largest, largest)
+    levels = np.linspace(-_DEEPEST * largest, largest, 3 * _SHADES + 1)
+    norm = _halves(largest)
+    shades = ax.contourf(x, y, shown.T, levels=levels, cmap=_MAP_OF_COLOURS, norm=norm)
+    lines = levels[levels > 0.5 * largest / _SHADES][::2]
+    ax.contour(x, y, shown.T, levels=lines, colors=style.GREY, linewidths=0.5)
+    bar = figure.colorbar(shades, ax=ax, pad=0.02, ticks=MaxNLocator(7))
+    bar.formatter.set_powerlimits((-2, 3))  # pyright: ignore[reportAttributeAccessIssue]
+    bar.ax.yaxis.get_offset_text().set_fontsize(7.5)
+    bar.ax.tick_params(labelsize=7.5, width=0.6, length=3.0)
+    bar.outline.set_linewidth(0.6)  # pyright: ignore[reportCallIssue]
+    bar.set_label("growth rate", fontsize=8.5, fontfamily="STIXGeneral")
+
+
+def _halves(largest: float) -> Any:
+    from matplotlib.colors import TwoSlopeNorm
+
+    return TwoSlopeNorm(0.0, -_DEEPEST * largest, largest)

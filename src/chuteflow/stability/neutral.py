@@ -1,0 +1,266 @@
+"""Neutral curves: where the growth rate of a mode vanishes, followed by continuation in a plane of two parameters.
+
+# notation: z = (a, b) coordinates of the plane, both of order one; sigma eigenvalue of the mode that is followed.
+
+The plane is that of the wavenumbers of one flow, or that of the wavenumber of waves in one direction and the place
+along a family of flows (:mod:`chuteflow.stability.planes`). The curve is that of Re sigma(z) = 0: one equation in two
+unknowns for the general continuation of :mod:`chuteflow.numerics.continuation`, with sigma followed from point to
+point. A scan of the plane says where curves are; each is entered from there. What changes between two grids is the
+error of a point; where that is large the mode has run into the continuous spectrum, and the curve ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from contourpy import contour_generator
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.continuation import Control, Point, closes, trace
+from chuteflow.numerics.eigenproblem import Complex, refined
+from chuteflow.stability.modes import Disturbances
+
+#: Steps of the central differences that give the slope of sigma: Newton's method does with few digits of it.
+_STEP = 1e-4
+#: The grids on which curves are followed, and on which their points are judged.
+_LEVEL, _JUDGE = 1, 2
+#: A mode changes with the coordinates as at the point before, by this share of the larger square of both slopes.
+_ALIKE = 0.3
+#: Error of a point, in the coordinates of the plane, beyond which it is none.
+_ASTRAY = 0.02
+#: How curves are followed: arclength is measured in the coordinates of the plane.
+CONTROL = Control(initial_step=0.01, min_step=1e-5, max_step=0.04, max_angle=0.25, tolerance=1e-7, max_points=600)
+#: Curves are one if a point of one lies this near to another.
+_SAME = 0.01
+
+
+class Plane(Protocol):
+    """A rectangle of two coordinates of order one, from (0, 0) to ``size``, each point of it a flow and a wave."""
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """The upper ends of the coordinates."""
+        ...
+
+    def wave(self, z: Array) -> tuple[Disturbances, float, float]:
+        """The disturbances, kx and ky at a point; at points a little outside too."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Leading eigenvalues sigma (m, n) at coordinates ``a`` (m,) and ``b`` (n,); NaN where no mode is seen."""
+
+    a: Array
+    b: Array
+    sigma: Complex
+
+    @property
+    def growth(self) -> Array:
+        """Re sigma."""
+        return np.array(np.real(self.sigma), dtype=float)
+
+    @property
+    def frequency(self) -> Array:
+        """-Im sigma."""
+        return np.array(-np.imag(self.sigma), dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class NeutralCurve:
+    """Points z (n, 2) of a neutral curve with frequencies -Im sigma and errors (n,), in order; why it ends.
+
+    ``error`` is the estimated distance from the true curve, in the coordinates of the plane.
+    """
+
+    z: Array
+    frequency: Array
+    error: Array
+    ends: tuple[str, str]
+
+
+def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list[NeutralCurve]:
+    """All neutral curves that ``scan`` sees in ``plane``."""
+    found: list[NeutralCurve] = []
+    for line in _lines(scan):
+        curve = _entered(plane, scan, line, found, control)
+        if curve is not None:
+            found.append(curve)
+    return found
+
+
+def _lines(scan: Scan) -> list[Array]:
+    """Rough neutral curves, long ones first: contours of the scan, each (k, 2)."""
+    growth = np.real(scan.sigma)
+    # Where no mode is seen, the continuous spectrum leads, which decays.
+    seen = np.isfinite(growth)
+    level = growth if seen.all() else np.where(seen, growth, -0.1 * np.nanmax(np.abs(growth), initial=1e-300))
+    lines = contour_generator(scan.a, scan.b, level.T).lines(0.0)
+    return sorted((np.asarray(line) for line in lines), key=len, reverse=True)
+
+
+def _entered(
+    plane: Plane, scan: Scan, line: Array, found: Sequence[NeutralCurve], control: Control
+) -> NeutralCurve | None:
+    """The neutral curve near a rough one; None if it is among those found, or cannot be entered."""
+    for share in (0.5, 0.25, 0.75, 0.1, 0.9):
+        i = int(share * (len(line) - 1))
+        along = line[min(i + 1, len(line) - 1)] - line[max(i - 1, 0)]
+        if not along.any():
+            continue
+        if any(np.hypot(*(curve.z - line[i]).T).min() < _SAME for curve in found):
+            return None
+        begin, sigma = _growing(scan, line[i])
+        onward, end = _side(plane, (begin, sigma), line[i], along, control)
+        if len(onward) < 2:
+            continue
+        if end == _CLOSED:
+            return _curve([*onward, onward[0]], (end, end))
+        back, start = _side(plane, (begin, sigma), line[i], -along, control)
+        return _curve([*back[:0:-1], *onward], (start, end))
+    return None
+
+
+def _growing(scan: Scan, near: Array) -> tuple[Array, complex]:
+    """The growing point of the scan that is nearest to ``near``, and its eigenvalue."""
+    away = np.hypot(*np.meshgrid(scan.a - near[0], scan.b - near[1], indexing="ij"))
+    away[~(np.real(scan.sigma) > 0.0)] = np.inf
+    i, j = np.unravel_index(int(away.argmin()), away.shape)
+    return np.array([scan.a[i], scan.b[j]]), complex(scan.sigma[i, j])
+
+
+@dataclass(frozen=True, eq=False)
+class _Neutral:
+    """A point of a curve with its eigenvalue and its error."""
+
+    z: Array
+    sigma: complex
+    error: float
+
+
+def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
+    return NeutralCurve(
+        z=np.array([point.z for point in points]),
+        frequency=np.array([-point.sigma.imag for point in points]),
+        error=np.array([point.error for point in points]),
+        ends=ends,
+    )
+
+
+_CLOSED = "its own beginning: it is closed"
+
+
+def _side(
+    plane: Plane, begin: tuple[Array, complex], start: Array, ahead: Array, control: Control
+) -> tuple[list[_Neutral], str]:
+    """Points from ``start`` along ``ahead`` to the edge of the plane, and why they end."""
+    system = _GrowthSystem(plane, *begin)
+    points: list[Point[_GrowthSystem]] = []
+    out: list[_Neutral] = []
+    path = trace(system, start, direction=ahead, control=control)
+    for point in path:
+        edge = _edge_passed(plane, point.z)
+        if edge is not None:
+            if out:
+                out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
+            return out, "the edge of the range"
+        judged = system.judged(point.z)
+        if judged.error > _ASTRAY:
+            return out, "where the mode runs into the continuous spectrum"
+        points.append(point)
+        out.append(judged)
+        if len(points) > 3 and closes(points[0], points[-2], points[-1]):
+            return out[:-1], _CLOSED
+    return out, f"a point from which it could not be followed ({path.status.name.lower().replace('_', ' ')})"
+
+
+def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:
+    """The coordinate that is outside the plane, and the edge that it has passed."""
+    for i, end in enumerate(plane.size):
+        if z[i] < 0.0:
+            return i, 0.0
+        if z[i] > end:
+            return i, end
+    return None
+
+
+def _at_edge(
+    system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: Control
+) -> Iterator[_Neutral]:
+    """The point of the curve where coordinate ``which`` is ``edge``, if there is one to be had."""
+    share = (edge - inside[which]) / (outside[which] - inside[which])
+    direction = np.eye(2)[which]
+    for point in trace(system, inside + share * (outside - inside), direction=direction, control=control):
+        z = np.where(direction > 0.0, edge, point.z)
+        judged = system.judged(z)
+        if judged.error <= _ASTRAY:
+            yield judged
+        return
+
+
+@dataclass(frozen=True, eq=False)
+class _Eigenvalue:
+    """sigma and its derivatives (2,) at a point."""
+
+    z: Array
+    sigma: complex
+    slope: Complex
+
+    def at(self, z: Array) -> complex:
+        """What is expected of sigma at a point near by."""
+        return complex(self.sigma + self.slope @ (z - self.z))
+
+    def same_mode(self, other: _Eigenvalue) -> bool:
+        """Whether the growth of the other changes in the same way: points of the continuous spectrum stand still."""
+        one, two = np.real(self.slope), np.real(other.slope)
+        return bool(one @ two > _ALIKE * max(one @ one, two @ two))
+
+
+class _GrowthSystem:
+    """Re sigma(z) = 0 for the mode that is ``sigma`` at ``begin``, followed from one point to the next.
+
+    A real rate that vanishes does so at the end of the continuous spectrum, of which a grid has points close below:
+    these are told from the mode by their slopes.
+    """
+
+    def __init__(self, plane: Plane, begin: Array, sigma: complex) -> None:
+        self._plane = plane
+        self._sure = self._tried = self._with_slope(begin, sigma)
+
+    @property
+    def weights(self) -> Array:
+        """Both coordinates count alike."""
+        return np.ones(2)
+
+    def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
+        """See chuteflow.numerics.continuation.System."""
+        there = self._followed(z)
+        if self._sure.same_mode(there):
+            self._tried = there
+        return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
+
+    def judged(self, z: Array) -> _Neutral:
+        """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""
+        self._sure = self._tried = there = self._followed(z)
+        growth = self._sigma(z, there.sigma, _JUDGE).real - there.sigma.real
+        steepness = float(np.hypot(*np.real(there.slope)))
+        return _Neutral(z, there.sigma, abs(growth) / steepness if steepness > 0.0 else np.inf)
+
+    def _followed(self, z: Array) -> _Eigenvalue:
+        nearest = min((self._tried, self._sure), key=lambda known: float(np.abs(known.z - z).max()))
+        return self._with_slope(z, nearest.at(z))
+
+    def _with_slope(self, z: Array, near: complex) -> _Eigenvalue:
+        sigma = self._sigma(z, near)
+        slope = [
+            (self._sigma(z + step, sigma) - self._sigma(z - step, sigma)) / (2.0 * _STEP) for step in _STEP * np.eye(2)
+        ]
+        return _Eigenvalue(z, sigma, np.array(slope))
+
+    def _sigma(self, z: Array, near: complex, level: int = _LEVEL) -> complex:
+        disturbances, kx, ky = self._plane.wave(z)
+        of = disturbances.coarse_operator(kx, ky, level)
+        return refined(of.matrix(kx, ky), of.weights, near)[0]

@@ -1,0 +1,45 @@
+"""Stability among the quantities of a study: flows are solved and judged one by one, about two seconds for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from chuteflow.errors import ChuteflowError
+from chuteflow.steady.flow import Flow
+
+#: Kinds, as their names in order of their flags, and numbers with what they are.
+JUDGED_KINDS = {"stable": ("unstable", "stable"), "mode": ("along", "across", "oblique", "uniform")}
+JUDGED_NUMBERS = {
+    "growth": "growth rate of the mode that grows fastest, in sqrt(g cos(theta)/d)",
+    "kx": "its wavenumber along the slope, in 1/d",
+    "ky": "its wavenumber across the slope, in 1/d",
+}
+#: Points of a chunk, unless a study says otherwise.
+JUDGED_CHUNK = 16
+
+
+def wanted(names: Sequence[str]) -> bool:
+    """Whether flows have to be judged for the quantities ``names``."""
+    return any(name in JUDGED_KINDS or name in JUDGED_NUMBERS for name in names)
+
+
+def judged(flow: Flow) -> tuple[dict[str, float], str | None]:
+    """What is known of the stability of ``flow`` by name, kinds as their flags, and why it is not known.
+
+    What is not known, and the mode where the continuous spectrum hides all of them, is left out.
+    """
+    from chuteflow.stability.verdict import stability_of
+
+    try:
+        found = stability_of(flow)
+    except ChuteflowError as error:
+        return {}, str(error)
+    out = {"stable": float(found.stable)}
+    if found.mode is not None:
+        out |= {
+            "mode": float(JUDGED_KINDS["mode"].index(found.mode.direction)),
+            "growth": found.mode.growth,
+            "kx": found.mode.kx,
+            "ky": found.mode.ky,
+        }
+    return out, None

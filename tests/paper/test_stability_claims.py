@@ -1,0 +1,54 @@
+"""The claims on Part 2: their verdicts, and that other flows would change them."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from chuteflow.paper.claims import CLAIMS, stability
+
+IDS = ("three-unstable-modes", "stable-in-a-small-part", "inversion-and-stability")
+
+
+@pytest.fixture
+def known(monkeypatch):
+    """Judged flows as the claims find them, by kind and density, without computing them."""
+
+    def judged(kind, density):
+        mode = SimpleNamespace(direction=kind, growth=0.01, kx=0.1, ky=0.0)
+        flow = SimpleNamespace(density=density, centre_of_mass=2.0)
+        return flow, SimpleNamespace(stable=kind == "stable", mode=mode, flow=flow)
+
+    table = {
+        "T_inf = 20": judged("across", "monotonic"),
+        "flow A": judged("across", "monotonic"),
+        "T_inf = 1.7": judged("stable", "monotonic"),
+        "T_inf = 1.2": judged("stable", "inverted"),
+        "flow C": judged("along", "inverted"),
+    }
+    monkeypatch.setattr(stability, "_judged", lambda: table)
+    monkeypatch.setattr(stability, "_dense", lambda: judged("oblique", "inverted")[1])
+    return table, judged
+
+
+def test_verdicts_follow_from_the_flows(known):
+    assert [CLAIMS[id].check().verdict for id in IDS] == ["confirmed"] * 3
+
+
+@pytest.mark.parametrize(
+    ("id", "name", "kind", "density"),
+    [
+        ("three-unstable-modes", "flow C", "across", "inverted"),
+        ("stable-in-a-small-part", "flow A", "stable", "monotonic"),
+        ("inversion-and-stability", "T_inf = 1.2", "along", "inverted"),
+    ],
+)
+def test_other_flows_change_a_verdict(known, id, name, kind, density):
+    table, judged = known
+    table[name] = judged(kind, density)
+    assert CLAIMS[id].check().verdict == "not confirmed"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("id", IDS)
+def test_real_flows_confirm_them(id):
+    assert CLAIMS[id].check().verdict == "confirmed"
