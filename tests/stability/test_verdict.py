@@ -41,6 +41,14 @@ def test_the_fastest_growing_mode_of_the_three_flows_of_the_paper(three, name, d
     assert aside.growth < mode.growth
 
 
+def test_long_waves_are_followed_to_their_own_summit():
+    # Rates of other modes lie close by: a mode lost on the way would end beside the summit.
+    (flow,) = chuteflow.flows(Chute(0.4, 0.9, 0.6, 0.8), Q=3.0)
+    _, mode = mode_of(flow, ky=0.0)
+    for kx in (5e-5, 8e-5, 1.2e-4, 1.5e-4, 2e-4, 5e-4):
+        assert leading_modes(flow, kx, 0.0)[0].growth < mode.growth
+
+
 def test_a_stable_flow():
     # Dilute, on a steep and rough base: nothing grows at any wavenumber of a fine map either.
     (flow,) = chuteflow.flows(Chute(0.535, 0.684, 0.5, 0.835), Q=0.355)

@@ -15,13 +15,15 @@ from chuteflow.sweeps import engine
 from chuteflow.sweeps.batch import Batch
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.marching import start
-from chuteflow.sweeps.numbers import KINDS
+from chuteflow.sweeps.numbers import DENSITIES, INTERIORS
 from chuteflow.sweeps.outcome import Reason, Status
 from chuteflow.sweeps.study import CHUTE, from_dict
 from chuteflow.theory.boundary import surface_stress
 from chuteflow.theory.laws import LAWS
 
 VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0.3, 1e3)}
+#: Kinds that are found without solving each flow.
+KINDS = {"interior": INTERIORS, "density": DENSITIES}
 MACROSCOPIC = ("mass_flux", "centre_of_mass", "mass_holdup")
 PAPER = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
 
@@ -48,8 +50,9 @@ def random_study(condition, points, seed):
 
 def chute_of(chunk, i):
     p = chunk.parameters
-    words = SURFACES[int(p["surface"][i])], tuple(LAWS)[int(p["closure"][i])]
-    return Chute(*(float(p[name][i]) for name in CHUTE), *words)
+    slope, e, ew, roughness = (float(p[name][i]) for name in CHUTE)
+    surface, closure = SURFACES[int(p["surface"][i])], tuple(LAWS)[int(p["closure"][i])]
+    return Chute(slope, e, ew, roughness, surface, closure)
 
 
 def bases_below(chute, temperature, stress):

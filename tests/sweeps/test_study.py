@@ -9,6 +9,7 @@ import pytest
 
 from chuteflow.errors import InputError
 from chuteflow.steady.quantities import NUMBERS
+from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.outcome import Status
 from chuteflow.sweeps.study import KINDS, from_canonical, from_dict, read
 
@@ -222,5 +223,5 @@ def test_the_study_of_the_documents_is_a_study(tmp_path):
     assert one.points == 20000
     assert one.chunks == 3
     # Every quantity that can be kept is named.
-    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS))
+    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS, *JUDGED_NUMBERS))
     assert all(f"{status.value} `{status.name.lower()}`" in page for status in Status)

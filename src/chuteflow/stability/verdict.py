@@ -9,7 +9,7 @@ along and across the slope are ridges by symmetry, and are climbed as such.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,8 @@ _SCAN, _ANGLES = 14, (0.0, 30.0, 60.0, 90.0)
 _RIVAL = 0.5
 #: Accuracy of ln k and a at a peak: rates are flat there.
 _PRECISION = 1e-3
+#: Longest step in ln k and the angle in which a mode is followed.
+_STEP = 0.1
 #: Angle by which it is seen whether a ridge is one, and below which a wave is along or across.
 _ASIDE, _ALIGNED = np.radians(4.0), np.radians(0.2)
 
@@ -114,7 +116,7 @@ class _Search:
 
     def most_unstable(self) -> Mode | None:
         """The mode of largest growth."""
-        found = [self._exact(*self._climbed(peak)) for peak in self._peaks()]
+        found = [self._summit(peak) for peak in self._peaks()]
         modes = [mode for mode in (*found, self._uniform()) if mode is not None]
         return max(modes, key=lambda mode: mode.growth, default=None)
 
@@ -155,19 +157,47 @@ class _Search:
         for i, j in np.argwhere((growth == best) | ((growth >= around) & (growth > max(0.0, _RIVAL * best)))):
             yield _Peak(float(logs[i]), float(angles[j]), complex(sigma[i, j]))
 
-    def _climbed(self, peak: _Peak) -> tuple[float, float]:
-        """kx and ky of the summit that ``peak`` leads to."""
+    def _summit(self, peak: _Peak) -> Mode | None:
+        """The mode at the summit that ``peak`` leads to."""
+        mode = self._exact(*self._climbed(peak, self._along_the_mode(peak)))
+        if mode is None or mode.growth < peak.sigma.real - mode.error:
+            # Another mode was taken for the one followed: climb by that which leads at each place.
+            mode = self._exact(*self._climbed(peak, self._leading_rate))
+        return mode
+
+    def _along_the_mode(self, peak: _Peak) -> Callable[[float, float], float]:
+        """The growth rate of the mode of ``peak`` as a function of ln k and the angle, followed in small steps."""
+        of = self.disturbances.coarse_operator(*self._place(peak.log_k, peak.angle))
+        known = [peak]
+
+        def rate(log_k: float, angle: float) -> float:
+            start = min(known, key=lambda at: np.hypot(at.log_k - log_k, at.angle - angle))
+            steps = max(1, int(np.ceil(np.hypot(start.log_k - log_k, start.angle - angle) / _STEP)))
+            at = start
+            for share in np.arange(1, steps + 1) / steps:
+                here = start.log_k + share * (log_k - start.log_k), start.angle + share * (angle - start.angle)
+                (before, _), (kx, ky) = self._place(at.log_k, at.angle), self._place(*here)
+                # Waves are carried along: their frequency is about proportional to kx.
+                near = complex(at.sigma.real, at.sigma.imag * (kx / before if before else 1.0))
+                at = _Peak(*here, refined(of.matrix(kx, ky), of.weights, near)[0])
+                known.append(at)
+            return at.sigma.real
+
+        return rate
+
+    def _leading_rate(self, log_k: float, angle: float) -> float:
+        """The growth rate of the leading mode; without one, that of what does not grow."""
+        found = leading(self.disturbances, *self._place(log_k, angle))
+        return found[0].growth if found else 0.0
+
+    def _climbed(self, peak: _Peak, rate: Callable[[float, float], float]) -> tuple[float, float]:
+        """kx and ky of the summit of ``rate``, a function of ln k and the angle, that ``peak`` leads to."""
         from scipy.optimize import minimize, minimize_scalar
 
         step = (self.bounds[1] - self.bounds[0]) / (_SCAN - 1)
-        place = self._place(peak.log_k, peak.angle)
-        of = self.disturbances.coarse_operator(*place)
-        rate = {"sigma": peak.sigma}
 
         def fall(log_k: float, angle: float) -> float:
-            kx, ky = self._place(log_k, angle)
-            rate["sigma"] = refined(of.matrix(kx, ky), of.weights, rate["sigma"])[0]
-            return -rate["sigma"].real
+            return -rate(log_k, angle)
 
         def along_ridge(start: float, angle: float) -> float:
             low, high = max(start - step, self.bounds[0]), min(start + step, self.bounds[1])
