@@ -1,6 +1,7 @@
 """Random points of random planes, classified by a map and by the full enumeration."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ def random_planes(seed, surface="free"):
     random = np.random.default_rng(seed)
     while True:
         x, y = random.choice(list(RANGES), 2, replace=False)
-        others = {name: float(random.uniform(*bounds)) for name, bounds in RANGES.items()}
+        others: dict[str, Any] = {name: float(random.uniform(*bounds)) for name, bounds in RANGES.items()}
         plane = Plane(
             Axis(str(x), *RANGES[x]), Axis(str(y), *RANGES[y]), Chute(**others, surface=surface), TEMPERATURES
         )

@@ -1,6 +1,7 @@
 """Boundaries through a second parameter, held against curves, finite differences, exact limits and scaling laws."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_three_flows_live_between_the_folds_beyond_the_cusp(cusped):
     (line,) = [line for line in cusped if line.cusps]
     slope = line.cusps[0].flow.chute.slope + 4e-4
     low, high = sorted(flow.mass_flux for flow in line.at(slope))
-    within = {"surface_temperature": (0.01, 100.0)}
+    within: dict[str, Any] = {"surface_temperature": (0.01, 100.0)}
     counts = [len(flows(replace(PAPER, slope=slope), Q=q, **within)) for q in (0.999 * low, (low * high) ** 0.5)]
     assert counts[1] == counts[0] + 2
     before = replace(PAPER, slope=line.cusps[0].flow.chute.slope - 1e-4)

@@ -138,7 +138,9 @@ def test_hot_flows_end_on_the_closed_form(base_map):
     limit = dilute(law("lun"), 0.8, 0.0)
     lines = [boundary for boundary in base_map.boundaries if boundary.kind == "F21=0"]
     off = [
-        abs(hot_parameters(limit, *map(float, point), 0.3).F21) for boundary in lines for point in boundary.points[1:-1]
+        abs(hot_parameters(limit, float(point[0]), float(point[1]), 0.3).F21)
+        for boundary in lines
+        for point in boundary.points[1:-1]
     ]
     assert max(off) < 5e-4
     inside = [hot(Chute(0.3, 0.8, x, y)).exists for x in base_map.x[::9] for y in base_map.y[::9]]

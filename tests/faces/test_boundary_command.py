@@ -6,6 +6,7 @@ import json
 import h5netcdf
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
 
 from chuteflow import Chute, boundary
 from chuteflow.faces import boundary_plot
@@ -86,6 +87,7 @@ def test_a_picture_counts_the_flows_of_every_region(folds):
     figure = plot_boundaries(folds)
     assert sorted(texts(figure)) == ["1", "1", "3"]
     for text in figure.axes[0].texts:
+        assert isinstance(text, Annotation)
         slope, flux = text.xy
         low, high = sorted(flow.mass_flux for line in folds for flow in line.at(slope))
         assert (text.get_text() == "3") == (low < flux < high)
