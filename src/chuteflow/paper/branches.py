@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Generic, TypeVar, overload
 
+from chuteflow import Branch, Flow
 from chuteflow.paper.sources import SteadyBranch, SteadyFlow
+
+F = TypeVar("F", bound=SteadyFlow, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(Generic[F]):
     """A flow of a branch; ``special`` is the kind of a special point, or empty."""
 
-    flow: SteadyFlow
+    flow: F
     special: str = ""
 
 
-def in_order(branch: SteadyBranch) -> Iterator[Point]:
+@overload
+def in_order(branch: Branch) -> Iterator[Point[Flow]]: ...
+@overload
+def in_order(branch: SteadyBranch) -> Iterator[Point[SteadyFlow]]: ...
+def in_order(branch: SteadyBranch) -> Iterator[Point[SteadyFlow]]:
     """The flows of ``branch`` with its special points in their places."""
     for i, flow in enumerate(branch.flows):
         yield Point(flow)
