@@ -89,6 +89,15 @@ def test_several_families():
         assert (np.diff(np.log(branch.mass_holdup)) != 0.0).all()
 
 
+def test_a_branch_ends_where_its_flows_are_not_resolved():
+    result = curve(Chute(0.38, 0.8, 0.8, 0.6), largest_holdup=300, points=60)
+    (branch,) = result.branches
+    assert branch.ends[0] == "it goes on to surface temperatures above 100000"
+    assert branch.ends[1] == "the finest grid did not reach the tolerance: ask for a larger tolerance"
+    assert 100.0 < branch.mass_holdup.max() < 300.0
+    assert max(flow.error for flow in branch.flows) <= 1e-10
+
+
 def test_no_family_says_why():
     result = curve(Chute(0.2, 0.8, 0.8, 0.85))
     assert result.branches == ()

@@ -134,3 +134,22 @@ def test_a_flow_set_is_a_sequence():
     assert list(found[:2]) == [found[0], found[1]]
     assert found[-1].surface_temperature == min(f.surface_temperature for f in found)
     assert np.isfinite([f.mass_flux for f in found]).all()
+
+
+def test_no_flow_strays_to_another_of_its_surface_temperature():
+    # One of two deep flows was lost where Newton's method on a coarse grid ran from its start to the other.
+    chute = Chute(
+        0.4376640473607999, 0.7200801029618495, 0.4020079295545805, 0.7537729039169501, "interface", "lun-fourier"
+    )
+    found = flows(chute, T_surface=0.03818473684352112)
+    assert len(found) == 6
+    # by an independent integration, DOP853
+    assert found[-1].mass_holdup == pytest.approx(20.01959871, rel=1e-8)
+
+
+def test_a_flow_just_beyond_the_range_extends_it():
+    # The rough end of the family passes the value just inside the range, the flow itself just outside.
+    chute = Chute(0.3701877234047303, 0.5626627358233449, 0.33102981650642344, 0.5128316109822653, "interface")
+    (found,) = flows(chute, Q=344.3168597509368)
+    assert found.surface_temperature == pytest.approx(1.0037e5, rel=1e-3)
+    assert flows(chute, Q=344.3168597509368).searched.surface_temperature[1] > found.surface_temperature

@@ -21,6 +21,8 @@ NEAR = 0.02
 _ASIDE = 3
 #: A flow found from a bracket lies within this many of its lengths, and a little.
 _BESIDE, _ROUGH = 1.0, 0.1
+#: Flows whose ln M and ln T_surface differ by less are one flow.
+_SAME = 1e-7
 #: Degrees on which a knot is tried in turn.
 _STARTS = (DEGREES[0], DEGREES[3], DEGREES[5])
 #: A chord is searched until sigma is known to this.
@@ -37,13 +39,24 @@ class Knot:
     exact: Solution | None = None
 
     def solved(self, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
-        """The flow near the knot that meets ``condition``; a profile too winding for one grid gets a finer one."""
-        solution = solve(*self.start(_STARTS[0]), condition, tolerance)
-        for degree in _STARTS[1:]:
-            if solution.status is not Status.NO_CONVERGENCE:
-                break
+        """The flow near the knot that meets ``condition``.
+
+        A profile too winding for one grid gets a finer one: on a coarse grid Newton's method may fail, or run to
+        another flow far away. One far away is returned only where no grid leads to a nearer one.
+        """
+        first: Solution | None = None
+        for degree in _STARTS:
             solution = solve(*self.start(degree), condition, tolerance)
-        return solution
+            if solution.status is Status.NO_CONVERGENCE:
+                first = first or solution
+                continue
+            apart = float(np.hypot(*(solution.macroscopic - self.macroscopic)[LOG_M:]))
+            if apart <= _ROUGH or self.exact is not None:
+                return solution
+            if first is None or not first.converged:
+                first = solution
+        assert first is not None
+        return first
 
     @classmethod
     def at(cls, solution: Solution) -> Knot:
@@ -64,11 +77,12 @@ def crossings(knots: Sequence[Knot], which: int, value: float, tolerance: float)
     brackets = [(knots[i], knots[i + 1]) for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))]
     nearer = [min(pair, key=lambda knot: abs(knot.macroscopic[which] - target)) for pair in brackets]
     direct = solve_many([knot.start(_STARTS[0]) for knot in nearer], [condition] * len(nearer), tolerance)
-    for pair, knot, found in zip(brackets, nearer, direct, strict=True):
+    for i, (pair, knot, found) in enumerate(zip(brackets, nearer, direct, strict=True)):
         solution = found if found.converged else knot.solved(condition, tolerance)
         # Beside a turn, which is exact, either of two flows may be found: only the bracket tells them apart.
         turning = pair[0].exact is not None and pair[1].exact is not None
-        if turning or not _is_between(*pair, solution):
+        contested = any(_same(found, other) for j, other in enumerate(direct) if j != i)
+        if turning or contested or not _is_between(*pair, solution):
             solution = _bracketed(*pair, which, target, condition, solution, tolerance)
         if solution is not None:
             yield solution
@@ -188,6 +202,12 @@ def turning_point(first: Solution, last: Solution, which: int, tolerance: float 
     if (slopes[0] > 0.0) == (slopes[1] > 0.0):
         return None
     return chord.zero(lambda solution: chord.slope(solution, which), slopes)
+
+
+def _same(one: Solution, other: Solution) -> bool:
+    """Whether two solutions are one flow: of those of two brackets, one at least has strayed."""
+    apart = np.abs(one.macroscopic - other.macroscopic)[LOG_M:].max()
+    return one.converged and other.converged and bool(apart < _SAME)
 
 
 def _is_between(a: Knot, b: Knot, solution: Solution) -> bool:

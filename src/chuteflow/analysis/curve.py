@@ -15,7 +15,6 @@ from chuteflow.analysis.existence import imbalance
 from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
-from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
@@ -47,7 +46,8 @@ def curve(
 
     Raises:
         InputError: for a range or number out of bounds.
-        SolveError: where a family could not be followed or a flow not solved to the tolerance.
+        SolveError: where a family could not be followed. Where flows of one could not be solved to the tolerance,
+            its branch ends, and says why.
     """
     if not 2 <= points <= 100_000:
         raise InputError(f"points = {points}: must be from 2 to 100000")
@@ -57,8 +57,9 @@ def curve(
     found = traced_families(problem, within)
     longest = max((float(family.arclength[-1]) for family in found), default=1.0)
     branches = [
-        _branch(chute, family, max(8, round(points * float(family.arclength[-1]) / longest)), tolerance)
+        _branch(chute, *stretch, tolerance)
         for family in found
+        for stretch in family.sampled(max(8, round(points * float(family.arclength[-1]) / longest)), tolerance)
     ]
     branches.sort(key=lambda branch: -float(branch.surface_temperature.max()))
     return Curve(
@@ -70,9 +71,7 @@ def curve(
     )
 
 
-def _branch(chute: Chute, family: TracedFamily, points: int, tolerance: float) -> Branch:
-    solutions = family.sampled(points, tolerance)
-    ends = family.ends
+def _branch(chute: Chute, solutions: list[Solution], ends: tuple[str, str], tolerance: float) -> Branch:
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
         solutions.reverse()
         ends = (ends[1], ends[0])

@@ -30,6 +30,8 @@ _LEADS = 0.25
 _MOST_DEEPER = 3
 #: Flows whose ln M and ln T_surface differ by less are one flow.
 _SAME = 1e-7
+#: The range reaches this factor beyond a flow that was found just outside.
+_ASIDE = 1.2
 _QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
@@ -90,17 +92,19 @@ def flows(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The families in a range, and the flows among them that meet a condition."""
+    """The families in a range, the flows among them that meet a condition, and those found just ``beyond`` it."""
 
     within: Range
     families: list[Family]
     solutions: list[Solution]
+    beyond: list[Solution]
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
     found = families(problem, within)
     solutions = [s for family in found for s in crossings(family.knots, which, value, tolerance)]
-    return _Search(within, found, _distinct([s for s in solutions if within.contains(s.macroscopic)]))
+    inside = _distinct([s for s in solutions if within.contains(s.macroscopic)])
+    return _Search(within, found, inside, [s for s in solutions if not within.contains(s.macroscopic)])
 
 
 def _asked(given: dict[str, float | None]) -> tuple[int, float]:
@@ -136,6 +140,13 @@ def _wider(search: _Search, which: int, value: float) -> Range:
                 if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
                     reach = np.clip(float(end[axis]) + 1.2 * left / slope + edge, -600.0, 600.0)
                     wider = wider.reaching(axis, float(np.exp(reach)))
+    # The rough end of a family may have passed the value inside the range, and the flow itself not.
+    for solution in search.beyond:
+        for axis in axes:
+            there = float(np.exp(solution.macroscopic[axis]))
+            if within.reaching(axis, there) != within:
+                outward = _ASIDE if axis == LOG_M or there > within.hottest else 1.0 / _ASIDE
+                wider = wider.reaching(axis, outward * there)
     return wider
 
 

@@ -113,11 +113,14 @@ class TracedFamily:
                 return True
         return False
 
-    def sampled(self, count: int, tolerance: float) -> list[Solution]:
+    def sampled(self, count: int, tolerance: float) -> list[tuple[list[Solution], tuple[str, str]]]:
         """``count`` flows from end to end, evenly in arclength, each solved to ``tolerance``.
 
+        They come as one stretch with its ends in words, or as several of two flows or more, where flows between
+        them, or at the ends, could not be solved: then the ends say why.
+
         Raises:
-            SolveError: where one was not.
+            SolveError: where there is no such stretch.
         """
         places = np.linspace(0.0, self.arclength[-1], count)
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.solutions) - 2)
@@ -127,10 +130,23 @@ class TracedFamily:
         starts = [chords[i].start_at(float(sigma)) for i, sigma in zip(index, sigmas, strict=True)]
         planes = [chords[i].condition_at(float(sigma)) for i, sigma in zip(index, sigmas, strict=True)]
         solutions = solve_many(starts, planes, tolerance)
-        for solution in solutions:
-            if not solution.converged:
-                raise SolveError(f"a flow of a family could not be solved: {solution.status.value}")
-        return solutions
+        good = [solution.converged for solution in solutions]
+        edges = np.flatnonzero(np.diff([False, *good, False])).tolist()
+        stretches = [
+            (
+                solutions[first:last],
+                (
+                    solutions[first - 1].status.value if first else self.ends[0],
+                    solutions[last].status.value if last < count else self.ends[1],
+                ),
+            )
+            for first, last in zip(edges[::2], edges[1::2], strict=True)
+            if last - first > 1
+        ]
+        if not stretches:
+            bad = solutions[good.index(False)]
+            raise SolveError(f"a flow of a family could not be solved: {bad.status.value}")
+        return stretches
 
 
 def traced(start: Solution, ahead: Array, within: Range, control: Control = CONTROL) -> TracedFamily:
