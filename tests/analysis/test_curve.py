@@ -89,6 +89,28 @@ def test_several_families():
         assert (np.diff(np.log(branch.mass_holdup)) != 0.0).all()
 
 
+def test_a_deep_family_between_two_columns_of_the_search_is_seen_with_its_turns():
+    # It lives between T = 2.731 and 2.749 alone, where trajectories part into cold and deep ones.
+    chute = Chute(0.4, 0.8, 0.8, 0.834)
+    _, deep = curve(chute).branches
+    (narrow,) = curve(chute, surface_temperature=(2.6, 2.9)).branches
+    assert deep.surface_temperature.max() == pytest.approx(narrow.surface_temperature.max(), rel=1e-8)
+    for kind in ("fold-M", "fold-T"):
+        (found,), (expected,) = special(deep, kind), special(narrow, kind)
+        assert found.mass_holdup == pytest.approx(expected.mass_holdup, rel=1e-8)
+        assert found.surface_temperature == pytest.approx(expected.surface_temperature, rel=1e-8)
+    found = [f.mass_holdup for f in flows(chute, T_surface=2.74)]
+    within = narrow.surface_temperature - 2.74
+    assert len(found) == int(np.sum(np.diff(np.sign(within)) != 0)) == 2
+
+
+def test_a_family_that_the_finest_grid_hardly_resolves_is_one_family():
+    chute = Chute(0.48942004601103606, 0.6744975382236548, 0.41699976506445435, 0.8428280523681839, "interface")
+    branches = curve(chute, points=60, tolerance=1e-8).branches
+    tops = sorted(branch.mass_holdup.min() for branch in branches)
+    assert np.diff(np.log(tops)).min() > 1e-3
+
+
 def test_a_branch_ends_where_its_flows_are_not_resolved():
     result = curve(Chute(0.38, 0.8, 0.8, 0.6), largest_holdup=300, points=60)
     (branch,) = result.branches

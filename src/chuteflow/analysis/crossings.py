@@ -27,6 +27,8 @@ _SAME = 1e-7
 _STARTS = (DEGREES[0], DEGREES[3], DEGREES[5])
 #: A chord is searched until sigma is known to this.
 _CLOSE = 1e-9
+#: Share of the slopes at the ends of a chord that is left at a turn.
+_FLAT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +203,9 @@ def turning_point(first: Solution, last: Solution, which: int, tolerance: float 
     slopes = chord.slope(first, which), chord.slope(last, which)
     if (slopes[0] > 0.0) == (slopes[1] > 0.0):
         return None
-    return chord.zero(lambda solution: chord.slope(solution, which), slopes)
+    turn = chord.zero(lambda solution: chord.slope(solution, which), slopes)
+    # Where the family runs across the chord the slope changes sign through infinity, or in a jump: that is no turn.
+    return turn if abs(chord.slope(turn, which)) <= _FLAT * max(map(abs, slopes)) else None
 
 
 def _same(one: Solution, other: Solution) -> bool:

@@ -7,6 +7,7 @@ in Q, M and T_surface by the general continuation of :mod:`chuteflow.numerics.co
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from chuteflow.analysis.existence import imbalance
 from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
+from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
@@ -59,7 +61,7 @@ def curve(
     branches = [
         _branch(chute, *stretch, tolerance)
         for family in found
-        for stretch in family.sampled(max(8, round(points * float(family.arclength[-1]) / longest)), tolerance)
+        for stretch in family.sampled(_samples(family, points, float(family.arclength[-1]) / longest), tolerance)
     ]
     branches.sort(key=lambda branch: -float(branch.surface_temperature.max()))
     return Curve(
@@ -69,6 +71,12 @@ def curve(
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
     )
+
+
+def _samples(family: TracedFamily, points: int, share: float) -> int:
+    """Flows of a family whose length is ``share`` of the longest: as even as those of that one, and, up to ``points``,
+    no fewer than it took to follow it around its turns."""
+    return max(8, round(points * share), min(points, len(family.solutions)))
 
 
 def _branch(chute: Chute, solutions: list[Solution], ends: tuple[str, str], tolerance: float) -> Branch:
@@ -87,12 +95,27 @@ def _folds(chute: Chute, solutions: Sequence[Solution], tolerance: float) -> lis
     for kind, which in _FOLDS.items():
         steps = np.diff(macroscopic[:, which])
         for i in np.flatnonzero((steps[:-1] > 0.0) != (steps[1:] > 0.0)).tolist():
-            for first in (i, i + 1):
-                turn = turning_point(solutions[first], solutions[first + 1], which, tolerance)
-                if turn is not None:
-                    found.append(SpecialPoint(kind, Flow(chute, turn), first))
-                    break
+            turn = _turn(solutions[i : i + 3], which, tolerance)
+            if turn is not None:
+                found.append(SpecialPoint(kind, Flow(chute, turn[1]), i + (turn[0] >= 0.5)))
     return found
+
+
+def _turn(three: Sequence[Solution], which: int, tolerance: float, halvings: int = 6) -> tuple[float, Solution] | None:
+    """The flow at which a quantity turns that rises and falls, or falls and rises, along ``three`` flows, and its
+    place, 0 to 1 along them. Where a family turns too sharply for its chords, they are halved."""
+    for half, pair in enumerate(pairwise(three)):
+        turn = turning_point(*pair, which, tolerance)
+        if turn is not None:
+            return 0.5 * half + 0.25, turn
+    if not halvings:
+        return None
+    first, middle, last = three
+    finer = [first, Chord(first, middle, tolerance).at(0.5), middle, Chord(middle, last, tolerance).at(0.5), last]
+    steps = np.diff([s.macroscopic[which] for s in finer])
+    i = int(np.argmax((steps[:-1] > 0.0) != (steps[1:] > 0.0)))
+    turn = _turn(finer[i : i + 3], which, tolerance, halvings - 1)
+    return None if turn is None else (0.25 * i + 0.5 * turn[0], turn[1])
 
 
 def _changes(flows: Sequence[Flow], tolerance: float) -> list[SpecialPoint]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chuteflow.analysis.crossings import Knot, solved
 from chuteflow.analysis.ranges import Range
 from chuteflow.analysis.tracing import TracedFamily, traced
-from chuteflow.analysis.trajectories import STEP, Trajectories, integrate, scan_table, surface_potential
+from chuteflow.analysis.trajectories import LOG_EMPTY, STEP, Trajectories, integrate, scan_table, surface_potential
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, Collocation
@@ -34,8 +34,8 @@ COLUMNS_PER_DECADE, FEWEST_COLUMNS = 12, 25
 TORN = 5.0
 #: Families traced at most: in a narrow window of slopes their number grows with the hold-up without bound.
 MOST_TRACED = 16
-#: Columns put into a gap between columns that are torn apart.
-_COLUMNS_IN_GAP = 8
+#: Columns put into a gap between columns that are torn apart, and how often the gap of a dividing trajectory is parted.
+_COLUMNS_IN_GAP, _PARTINGS = 8, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,21 +154,45 @@ class Landscape:
 
 
 def scanned(model: Model, within: Range) -> Landscape:
-    """The landscape of a range, with more columns between those that zeros of the excess tear apart: a family
-    that lives between two columns alone is seen there."""
-    columns = temperatures(within.coldest, within.hottest)
-    scene = landscape(model, columns, within.deepest)
+    """The landscape of a range, with more columns between those that are torn apart: a family that lives between
+    two columns alone is seen there.
+
+    Zeros of the excess tell where it is torn, and so do neighbouring trajectories that end in different ways: deep
+    families lie close to the one that divides them, and the gap that it lies in is parted again.
+    """
+    scene = landscape(model, temperatures(within.coldest, within.hottest), within.deepest)
     torn = {int(column) for line in _lines(scene) for column in line[_torn(scene, line), 0]}
-    if not torn:
-        return scene
-    between = [np.geomspace(columns[i], columns[i + 1], _COLUMNS_IN_GAP + 2)[1:-1] for i in sorted(torn)]
-    return landscape(model, np.sort(np.concatenate([columns, *between])), within.deepest)
+    t = scene.trajectories
+    for _ in range(_PARTINGS):
+        torn |= _dividing(t)
+        if not torn:
+            break
+        edges = t.temperature
+        between = [np.geomspace(edges[i], edges[i + 1], _COLUMNS_IN_GAP + 2)[1:-1] for i in sorted(torn)]
+        t = t.joined(integrate(model, np.concatenate(between), within.deepest))
+        torn = set()
+    return scene if t is scene.trajectories else _landscape(t)
+
+
+def _dividing(t: Trajectories) -> set[int]:
+    """The gaps between neighbouring trajectories that end in different ways (cold, hot, or at the largest hold-up)
+    and are torn apart."""
+    columns = np.arange(len(t.temperature))
+    cold = np.isneginf(t.y[t.last, columns])
+    hot = ~cold & (t.big_l[t.last, columns] < LOG_EMPTY)
+    differ = (cold[1:] != cold[:-1]) | (hot[1:] != hot[:-1])
+    row = np.minimum(t.last[1:], t.last[:-1])
+    apart = np.abs(t.big_l[row, columns[1:]] - t.big_l[row, columns[:-1]]) > TORN * np.diff(np.log(t.temperature))
+    return set(np.flatnonzero(differ & (apart | cold[1:] | cold[:-1])).tolist())
 
 
 def landscape(model: Model, temperature: Array, mass: float) -> Landscape:
     """The landscape of ``model`` over surface temperatures (C,) ascending and hold-ups up to ``mass``."""
-    t = integrate(model, temperature, mass)
-    base, *fields = scan_table(model).at(t.big_l)
+    return _landscape(integrate(model, temperature, mass))
+
+
+def _landscape(t: Trajectories) -> Landscape:
+    base, *fields = scan_table(t.model).at(t.big_l)
     return Landscape(t, t.y - base, _integrals(t, *fields))
 
 

@@ -109,7 +109,9 @@ class TracedFamily:
         for i in np.flatnonzero(near).tolist():
             chord = Chord(self.solutions[i], self.solutions[i + 1])
             there = solve(*chord.start_at(float(sigma[i])), chord.condition_at(float(sigma[i])))
-            if there.converged and np.abs(there.macroscopic - solution.macroscopic).max() < _SAME:
+            apart = np.abs(there.macroscopic - solution.macroscopic).max()
+            # What the finest grid leaves of the error is known, and two traces of one deep family differ by it.
+            if there.status is not Status.NO_CONVERGENCE and apart < max(_SAME, there.error + solution.error):
                 return True
         return False
 

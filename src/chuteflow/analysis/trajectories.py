@@ -35,7 +35,7 @@ START = 0.05
 _THIN_ROWS, _THIN_STEP = 40, 0.5
 #: A trajectory is called empty below this x, and cold where y is below this multiple of its scale.
 EMPTY, COLD = 1e-6, 4.0
-_LOG_EMPTY = float(np.log(EMPTY))
+LOG_EMPTY = float(np.log(EMPTY))
 _LOW, _HIGH, _ENTRIES = -25.0, 60.0, 4096
 _SCALE = (_ENTRIES - 1) / (_HIGH - _LOW)
 
@@ -112,6 +112,26 @@ class Trajectories:
         """The step variable at normal stresses ``p``, from that of p = 1 on."""
         return np.log(p) + (p - 1.0) / self.p1
 
+    def joined(self, other: Trajectories) -> Trajectories:
+        """These trajectories and ``other`` ones of the same model and depth, ascending in surface temperature."""
+        order = np.argsort(temperature := np.concatenate([self.temperature, other.temperature]), kind="stable")
+        rows = max(len(self.p), len(other.p))
+
+        def side_by_side(one: Array, two: Array) -> Array:
+            both = (np.pad(a, ((0, rows - len(a)), (0, 0)), mode="edge") for a in (one, two))
+            return np.concatenate(list(both), axis=1)[:, order]
+
+        return Trajectories(
+            self.model,
+            temperature[order],
+            side_by_side(self.p, other.p),
+            side_by_side(self.big_l, other.big_l),
+            side_by_side(self.y, other.y),
+            np.concatenate([self.last, other.last])[order],
+            self.thin,
+            self.p1,
+        )
+
 
 def rates(model: Model) -> tuple[float, float]:
     """Fastest rate of y in p, and the largest y at which loss and conduction balance."""
@@ -164,7 +184,7 @@ def integrate(model: Model, temperature: Array, mass: float) -> Trajectories:
         rows.append(row)
         done = cold | (p >= end)
         if empty_net > 0.0:
-            done |= (big_l < _LOG_EMPTY) & (y >= 0.0) & ((y > meets) | beyond_meeting)
+            done |= (big_l < LOG_EMPTY) & (y >= 0.0) & ((y > meets) | beyond_meeting)
         if done.any():
             active, state = active[~done], state[:, ~done]
     whole = np.array(rows)
