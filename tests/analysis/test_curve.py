@@ -104,6 +104,7 @@ def test_a_deep_family_between_two_columns_of_the_search_is_seen_with_its_turns(
     assert len(found) == int(np.sum(np.diff(np.sign(within)) != 0)) == 2
 
 
+@pytest.mark.slow
 def test_a_family_that_the_finest_grid_hardly_resolves_is_one_family():
     chute = Chute(0.48942004601103606, 0.6744975382236548, 0.41699976506445435, 0.8428280523681839, "interface")
     branches = curve(chute, points=60, tolerance=1e-8).branches
@@ -112,7 +113,7 @@ def test_a_family_that_the_finest_grid_hardly_resolves_is_one_family():
 
 
 def test_a_branch_ends_where_its_flows_are_not_resolved():
-    result = curve(Chute(0.38, 0.8, 0.8, 0.6), largest_holdup=300, points=60)
+    result = curve(Chute(0.38, 0.8, 0.8, 0.6), largest_holdup=300, points=16)
     (branch,) = result.branches
     assert branch.ends[0] == "it goes on to surface temperatures above 100000"
     assert branch.ends[1] == "the finest grid did not reach the tolerance: ask for a larger tolerance"

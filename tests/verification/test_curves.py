@@ -125,7 +125,7 @@ def test_a_quantity_turns_where_the_fold_says(name):
         assert abs(bend) > 1e-3
 
 
-@pytest.mark.parametrize("beside", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("beside", [pytest.param(1e-2, marks=pytest.mark.slow), 1e-5, 1e-8])
 def test_two_flows_more_on_one_side_of_a_fold(name, beside):
     chute = CHUTES[name]
     case = Case(chute.slope, chute.restitution, chute.wall_restitution, chute.roughness, chute.surface)
