@@ -50,10 +50,14 @@ class Page(HTMLParser):
 
 
 @pytest.fixture
-def few_claims(monkeypatch):
-    """The table with few claims, quick ones."""
+def few_claims():
+    """The table with few claims, quick ones; afterwards all of them, in their order."""
+    every = dict(CLAIMS)
     for id in set(CLAIMS) - set(FEW):
-        monkeypatch.delitem(CLAIMS, id)
+        del CLAIMS[id]
+    yield
+    CLAIMS.clear()
+    CLAIMS.update(every)
 
 
 @pytest.fixture(scope="module")

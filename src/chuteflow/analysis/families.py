@@ -11,6 +11,7 @@ and its family is followed by continuation instead.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -55,8 +56,7 @@ def families(model: Model, within: Range) -> list[Family]:
     """Every family of flows in the range: as chains of rough flows, or traced where a chain is torn."""
     whole: list[Family] = []
     torn: list[TracedFamily] = []
-    scene = scanned(model, within)
-    for chain in sorted(chains(scene), key=len, reverse=True):
+    for scene, chain in chains(model, within):
         knots = scene.knots(chain)
         if chain.torn:
             _trace_anew(knots, within, torn)
@@ -68,8 +68,7 @@ def families(model: Model, within: Range) -> list[Family]:
 def traced_families(model: Model, within: Range) -> list[TracedFamily]:
     """Every family of flows in the range, traced from end to end."""
     found: list[TracedFamily] = []
-    scene = scanned(model, within)
-    for chain in sorted(chains(scene), key=len, reverse=True):
+    for scene, chain in chains(model, within):
         _trace_anew(scene.knots(chain), within, found)
     return found
 
@@ -153,25 +152,54 @@ class Landscape:
         return problem, np.concatenate([mass * flux / f[CONDUCTION], [potential, log_mass]])
 
 
-def scanned(model: Model, within: Range) -> Landscape:
-    """The landscape of a range, with more columns between those that are torn apart: a family that lives between
-    two columns alone is seen there.
+def chains(model: Model, within: Range) -> list[tuple[Landscape, Chain]]:
+    """The zero set of the excess in a range as chains of rough flows, longest first, each with its landscape.
 
-    Zeros of the excess tell where it is torn, and so do neighbouring trajectories that end in different ways: deep
-    families lie close to the one that divides them, and the gap that it lies in is parted again.
+    A family may live between two columns alone that are torn apart. Zeros of the excess tell where they are, and so do
+    neighbouring trajectories that end in different ways: deep families lie close to the one that divides them. Such a
+    gap gets a landscape of its own, of which the lines within it are new; those that reach its sides are known.
     """
     scene = landscape(model, temperatures(within.coldest, within.hottest), within.deepest)
-    torn = {int(column) for line in _lines(scene) for column in line[_torn(scene, line), 0]}
+    lines = _lines(scene)
+    found = [(scene, chain) for line in lines for chain in _cut(scene, line)]
+    torn = {int(column) for line in lines for column in line[_torn(scene, line), 0]}
     t = scene.trajectories
-    for _ in range(_PARTINGS):
-        torn |= _dividing(t)
-        if not torn:
+    for part in _within_gaps(t, sorted(torn | _dividing(t)), within.deepest):
+        sides = 0, len(part.trajectories.temperature) - 1
+        for line in _lines(part):
+            if sides[0] < line[:, 0].min() and line[:, 0].max() < sides[1]:
+                found += [(part, chain) for chain in _cut(part, line)]
+    return sorted(found, key=lambda pair: len(pair[1]), reverse=True)
+
+
+def _within_gaps(t: Trajectories, gaps: Sequence[int], mass: float) -> list[Landscape]:
+    """The landscape of each gap after a column, with more columns beside trajectories that divide."""
+    parts = _integrated(t.model, [_spread(t.temperature, gap) for gap in gaps], mass)
+    for _ in range(1, _PARTINGS):
+        dividing = [sorted(_dividing(part)) for part in parts]
+        wanted = [
+            np.concatenate([_spread(part.temperature, i)[1:-1] for i in inside]) if inside else np.zeros(0)
+            for part, inside in zip(parts, dividing, strict=True)
+        ]
+        finer = _integrated(t.model, wanted, mass)
+        if not finer:
             break
-        edges = t.temperature
-        between = [np.geomspace(edges[i], edges[i + 1], _COLUMNS_IN_GAP + 2)[1:-1] for i in sorted(torn)]
-        t = t.joined(integrate(model, np.concatenate(between), within.deepest))
-        torn = set()
-    return scene if t is scene.trajectories else _landscape(t)
+        parts = [part.joined(more) if len(more.temperature) else part for part, more in zip(parts, finer, strict=True)]
+    return [_landscape(part) for part in parts]
+
+
+def _integrated(model: Model, wanted: Sequence[Array], mass: float) -> list[Trajectories]:
+    """Trajectories at each set of surface temperatures, integrated side by side at little more than the cost of one."""
+    if not sum(map(len, wanted)):
+        return []
+    every = integrate(model, np.concatenate(wanted), mass)
+    ends = np.cumsum([len(part) for part in wanted]).tolist()
+    return [every.columns(slice(end - len(part), end)) for part, end in zip(wanted, ends, strict=True)]
+
+
+def _spread(temperature: Array, gap: int) -> Array:
+    """Columns across a gap, its sides among them."""
+    return np.geomspace(temperature[gap], temperature[gap + 1], _COLUMNS_IN_GAP + 2)
 
 
 def _dividing(t: Trajectories) -> set[int]:
@@ -230,11 +258,6 @@ def _running(rate: Array) -> Array:
     total = np.zeros_like(rate)
     np.cumsum(STEP * steps, axis=0, out=total[1:])
     return total
-
-
-def chains(scene: Landscape) -> list[Chain]:
-    """The zero set of the excess as chains of rough flows."""
-    return [chain for line in _lines(scene) for chain in _cut(scene, line)]
 
 
 def _lines(scene: Landscape) -> list[Array]:

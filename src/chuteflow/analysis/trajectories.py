@@ -18,7 +18,7 @@ when y runs to minus infinity at finite p.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -112,6 +112,17 @@ class Trajectories:
         """The step variable at normal stresses ``p``, from that of p = 1 on."""
         return np.log(p) + (p - 1.0) / self.p1
 
+    def columns(self, which: slice) -> Trajectories:
+        """Some of these trajectories."""
+        return replace(
+            self,
+            temperature=self.temperature[which],
+            p=self.p[:, which],
+            big_l=self.big_l[:, which],
+            y=self.y[:, which],
+            last=self.last[which],
+        )
+
     def joined(self, other: Trajectories) -> Trajectories:
         """These trajectories and ``other`` ones of the same model and depth, ascending in surface temperature."""
         order = np.argsort(temperature := np.concatenate([self.temperature, other.temperature]), kind="stable")
@@ -121,15 +132,13 @@ class Trajectories:
             both = (np.pad(a, ((0, rows - len(a)), (0, 0)), mode="edge") for a in (one, two))
             return np.concatenate(list(both), axis=1)[:, order]
 
-        return Trajectories(
-            self.model,
-            temperature[order],
-            side_by_side(self.p, other.p),
-            side_by_side(self.big_l, other.big_l),
-            side_by_side(self.y, other.y),
-            np.concatenate([self.last, other.last])[order],
-            self.thin,
-            self.p1,
+        return replace(
+            self,
+            temperature=temperature[order],
+            p=side_by_side(self.p, other.p),
+            big_l=side_by_side(self.big_l, other.big_l),
+            y=side_by_side(self.y, other.y),
+            last=np.concatenate([self.last, other.last])[order],
         )
 
 
