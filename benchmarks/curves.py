@@ -18,7 +18,7 @@ import by_auto
 import by_bice
 from chuteflow import Chute, Curve, curve, flows
 from chuteflow.steady.mapped_curve import mapped_curve
-from timing import Row, median_time
+from timing import Row, forget_search, median_time
 
 Array = NDArray[np.float64]
 PAPER = Chute(slope=0.3, restitution=0.8, wall_restitution=0.8, roughness=0.6)
@@ -34,7 +34,7 @@ _SAME = 1e-2
 
 def compared() -> list[Row]:
     """One row for each way to the curve."""
-    own = median_time(_own, 9).cpu
+    own = median_time(_own, 9, before=forget_search).cpu
     folds, error = _folds(_own(1e-11))
     drift = float(np.abs(_folds(_own())[0] / folds - 1.0).max())
     rows = [

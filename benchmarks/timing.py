@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import resource
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+
+from chuteflow.analysis.families import chains, families
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,21 @@ def median_time(run: Callable[[], object], repeats: int, before: Callable[[], ob
         cpus.append(1e3 * (_processor_time() - cpu))
         walls.append(1e3 * (time.perf_counter() - wall))
     return Time(statistics.median(walls), statistics.median(cpus))
+
+
+def forget() -> None:
+    """Clear every cache of the package."""
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == "chuteflow":
+            for thing in vars(module).values():
+                if hasattr(thing, "cache_clear"):
+                    thing.cache_clear()
+
+
+def forget_search() -> None:
+    """Forget the families of the last chutes, and nothing else."""
+    families.cache_clear()
+    chains.cache_clear()
 
 
 def _processor_time() -> float:

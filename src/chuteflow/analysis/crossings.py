@@ -165,9 +165,8 @@ class Chord:
 
     def slope(self, solution: Solution, which: int) -> float:
         """Derivative of the logarithm ``which`` with respect to sigma at a flow of the stretch."""
-        state = solution.problem.state(solution.z)
-        gradient = state.macroscopic_gradient()
-        matrix = np.vstack([state.jacobian(), np.array(self._weights) @ gradient])
+        gradient = solution.state.macroscopic_gradient()
+        matrix = np.vstack([solution.state.jacobian(), np.array(self._weights) @ gradient])
         side = np.zeros(len(matrix))
         side[-1] = 1.0
         return float(gradient[which] @ np.linalg.solve(matrix, side))

@@ -20,7 +20,7 @@ from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.flow import Flow
+from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 
@@ -83,7 +83,7 @@ def _branch(chute: Chute, solutions: list[Solution], ends: tuple[str, str], tole
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
         solutions.reverse()
         ends = (ends[1], ends[0])
-    flows = [Flow(chute, s) for s in solutions]
+    flows = flows_of(chute, solutions)
     special = [*_folds(chute, solutions, tolerance), *_changes(flows, tolerance)]
     return Branch(tuple(flows), tuple(sorted(special, key=lambda point: point.position)), ends)
 

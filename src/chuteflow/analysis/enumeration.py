@@ -19,7 +19,7 @@ from chuteflow.analysis.results import FlowSet, Searched
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.flow import Flow
+from chuteflow.steady.flow import flows_of
 from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 
@@ -81,7 +81,7 @@ def flows(
             break  # what the narrower range holds is complete in itself
     return FlowSet(
         chute=chute,
-        flows=tuple(Flow(chute, s) for s in search.solutions),
+        flows=tuple(flows_of(chute, search.solutions)),
         searched=Searched((search.within.coldest, search.within.hottest), search.within.deepest),
         tolerance=tolerance,
         reason=None
@@ -95,7 +95,7 @@ class _Search:
     """The families in a range, the flows among them that meet a condition, and those found just ``beyond`` it."""
 
     within: Range
-    families: list[Family]
+    families: tuple[Family, ...]
     solutions: list[Solution]
     beyond: list[Solution]
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from contourpy import contour_generator
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from chuteflow.analysis.crossings import Knot, solved
 from chuteflow.analysis.ranges import Range
-from chuteflow.analysis.tracing import TracedFamily, traced
+from chuteflow.analysis.tracing import TracedFamily, solved_together, traced
 from chuteflow.analysis.trajectories import LOG_EMPTY, STEP, Trajectories, integrate, scan_table, surface_potential
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -36,7 +36,9 @@ TORN = 5.0
 #: Families traced at most: in a narrow window of slopes their number grows with the hold-up without bound.
 MOST_TRACED = 16
 #: Columns put into a gap between columns that are torn apart, and how often the gap of a dividing trajectory is parted.
-_COLUMNS_IN_GAP, _PARTINGS = 8, 2
+_COLUMNS_IN_GAP, _PARTINGS = 8, 3
+#: Searches whose result is remembered.
+_REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,34 +54,44 @@ class Family:
         return np.array([knot.macroscopic for knot in self.knots])
 
 
-def families(model: Model, within: Range) -> list[Family]:
-    """Every family of flows in the range: as chains of rough flows, or traced where a chain is torn."""
+@lru_cache(maxsize=_REMEMBERED)
+def families(model: Model, within: Range) -> tuple[Family, ...]:
+    """Every family of flows in the range: as chains of rough flows, or traced where a chain is torn.
+
+    Those of the last few chutes are remembered: one asks for other flows of the same chute next.
+    """
     whole: list[Family] = []
     torn: list[TracedFamily] = []
     for scene, chain in chains(model, within):
         knots = scene.knots(chain)
         if chain.torn:
-            _trace_anew(knots, within, torn)
+            _add_solved(knots, within, torn, whole=False)
         else:
             whole.append(Family(tuple(knots), False))
-    return whole + [Family(tuple(map(Knot.at, t.solutions)), True) for t in torn]
+    return (*whole, *(Family(tuple(map(Knot.at, t.solutions)), True) for t in torn))
 
 
 def traced_families(model: Model, within: Range) -> list[TracedFamily]:
-    """Every family of flows in the range, traced from end to end."""
+    """Every family of flows in the range, solved from end to end."""
     found: list[TracedFamily] = []
     for scene, chain in chains(model, within):
-        _trace_anew(scene.knots(chain), within, found)
+        _add_solved(scene.knots(chain), within, found, whole=not chain.torn)
     return found
 
 
-def _trace_anew(knots: list[Knot], within: Range, found: list[TracedFamily]) -> None:
-    """Add the family of the rough flows ``knots`` to ``found``, unless it is there already."""
+def _add_solved(knots: list[Knot], within: Range, found: list[TracedFamily], *, whole: bool) -> None:
+    """Add the family of the rough flows ``knots`` to ``found``, unless it is there already: solved side by side where
+    they are the ``whole`` of it, else followed from one of them."""
     if len(found) == MOST_TRACED:
         raise SolveError(
             f"this chute has more than {MOST_TRACED} families of deep flows up to a hold-up of {within.deepest:g}: "
             "search to a smaller one"
         )
+    together = solved_together(knots, within) if whole else None
+    if together is not None:
+        if not any(family.holds(together.solutions[len(together.solutions) // 2]) for family in found):
+            found.append(together)
+        return
     for i in _from_middle(len(knots)):
         solution, ahead = solved(knots, i)
         if solution.converged:
@@ -152,7 +164,8 @@ class Landscape:
         return problem, np.concatenate([mass * flux / f[CONDUCTION], [potential, log_mass]])
 
 
-def chains(model: Model, within: Range) -> list[tuple[Landscape, Chain]]:
+@lru_cache(maxsize=_REMEMBERED)
+def chains(model: Model, within: Range) -> tuple[tuple[Landscape, Chain], ...]:
     """The zero set of the excess in a range as chains of rough flows, longest first, each with its landscape.
 
     A family may live between two columns alone that are torn apart. Zeros of the excess tell where they are, and so do
@@ -169,7 +182,7 @@ def chains(model: Model, within: Range) -> list[tuple[Landscape, Chain]]:
         for line in _lines(part):
             if sides[0] < line[:, 0].min() and line[:, 0].max() < sides[1]:
                 found += [(part, chain) for chain in _cut(part, line)]
-    return sorted(found, key=lambda pair: len(pair[1]), reverse=True)
+    return tuple(sorted(found, key=lambda pair: len(pair[1]), reverse=True))
 
 
 def _within_gaps(t: Trajectories, gaps: Sequence[int], mass: float) -> list[Landscape]:

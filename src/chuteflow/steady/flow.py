@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.solver import Solution
 
@@ -112,7 +113,7 @@ class Flow:
     @property
     def base_volume_fraction(self) -> float:
         """nu at the base."""
-        return float(self._density(self._state.x, self._state.f)[-1])
+        return float(_density(self._state.x, self._state.f)[-1])
 
     @property
     def slip_velocity(self) -> float:
@@ -221,9 +222,9 @@ class Flow:
     def _model(self) -> Model:
         return self.solution.problem.model
 
-    @cached_property
+    @property
     def _state(self) -> State:
-        return self.solution.problem.state(self.solution.z)
+        return self.solution.state
 
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
@@ -241,29 +242,20 @@ class Flow:
         rise = p * g / state.mass
         fields = {
             "p": p,
-            "nu": self._density(x, f),
+            "nu": _density(x, f),
             "y": f[CONDUCTION] * g / state.mass,
             "rise": rise,
             "log_t": theta + f[GAMMA],
         }
         return fields, f
 
-    @staticmethod
-    def _density(x: Array, f: Array) -> Array:
-        return x * np.exp(f[DENSITY])
-
     def _log_density(self, share: float) -> float:
         return float(np.log(self._at_share(np.array([share]))[0]["nu"][0]))
 
     @cached_property
     def _samples(self) -> dict[str, Array]:
-        """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid."""
-        problem, state = self.solution.problem, self._state
-        degree = max(_SAMPLES, 2 * problem.degree)
-        nodal = np.stack([self._density(state.x, state.f), state.rise, state.net_loss])
-        nu, rise, net = nodal @ refinement(problem.degree, degree).T
-        share, _ = stretch_map(grid(degree).nodes, problem.stretch)
-        return {"share": share, "nu": nu, "rise": rise, "net": net}
+        """What kinds are told from, see :func:`_samples_of`."""
+        return _samples_of(self._state)
 
     @cached_property
     def _share_of_largest(self) -> Array:
@@ -343,3 +335,30 @@ class Flow:
             "production": slope**2 * f[WORK] * nu * p * root_t,
             "dissipation": f[LOSS] * nu * p * root_t,
         }
+
+
+def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
+    """The flows of many ``solutions`` on ``chute``; what their kinds are told from is computed side by side."""
+    flows = [Flow(chute, solution) for solution in solutions]
+    for degree in {solution.problem.degree for solution in solutions}:
+        members = [flow for flow in flows if flow.solution.problem.degree == degree]
+        stretches = np.array([[flow.solution.problem.stretch] for flow in members])
+        problem = Collocation(members[0].solution.problem.model, degree, stretches)
+        samples = _samples_of(problem.state(np.array([flow.solution.z for flow in members])))
+        for i, flow in enumerate(members):
+            vars(flow)["_samples"] = {name: values[i] for name, values in samples.items()}
+    return flows
+
+
+def _samples_of(state: State) -> dict[str, Array]:
+    """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
+    problem = state.problem
+    degree = max(_SAMPLES, 2 * problem.degree)
+    nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
+    nu, rise, net = nodal @ refinement(problem.degree, degree).T
+    share, _ = stretch_map(grid(degree).nodes, problem.stretch)
+    return {"share": share, "nu": nu, "rise": rise, "net": net}
+
+
+def _density(x: Array, f: Array) -> Array:
+    return x * np.exp(f[DENSITY])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -69,6 +70,11 @@ class Solution:
     def converged(self) -> bool:
         """Whether the tolerance was reached."""
         return self.status is Status.CONVERGED
+
+    @cached_property
+    def state(self) -> State:
+        """Everything pointwise at the nodes."""
+        return self.problem.state(self.z)
 
 
 def checked_tolerance(tolerance: float) -> None:

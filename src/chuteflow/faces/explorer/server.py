@@ -45,7 +45,7 @@ class _Terms:
 #: Each question has a process of its own, so that quick ones never wait for slow ones; and slow ones give way.
 _TERMS = {
     "flows": _Terms(10.0, 0),
-    "curve": _Terms(20.0, 0),
+    "curve": _Terms(20.0, 5),
     "export": _Terms(60.0, 4),
     "map": _Terms(30.0, 10),
     "stability": _Terms(60.0, 12, breaks_off=True),
