@@ -5,7 +5,7 @@ import pytest
 
 from chuteflow import Chute, curve, flows
 from chuteflow.analysis.crossings import solved
-from chuteflow.analysis.families import chains, families
+from chuteflow.analysis.families import chains, families, traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.tracing import solved_together, traced
 from chuteflow.steady.flow import Flow, flows_of
@@ -50,6 +50,17 @@ def test_what_ends_inside_the_range_or_strays_is_not_solved_side_by_side():
     assert solved_together(knots[:2], within) is None
     gap = [*knots[: len(knots) // 3], *knots[-len(knots) // 3 :]]
     assert solved_together(gap, within) is None
+
+
+def test_a_piece_torn_off_that_leads_nowhere_is_of_the_family_that_passes_there():
+    chute = Chute(0.5434225512790919, 0.7005437569942514, 0.9230351569159698, 0.8462493049634314)
+    within = Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP)
+    pieces = [scene.knots(chain) for scene, chain in chains(model(chute), within)]
+    assert any(not solved(knots, i)[0].converged for knots in pieces for i in range(len(knots)) if len(knots) == 1)
+    (family,) = traced_families(model(chute), within)
+    assert all(family.passes(knots) for knots in pieces)
+    (hot,) = traced_families(model(PAPER), within)
+    assert not hot.passes(pieces[0])
 
 
 def test_the_families_of_the_last_chutes_are_remembered():

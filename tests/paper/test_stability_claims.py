@@ -26,7 +26,7 @@ def known(monkeypatch):
         "flow C": judged("along", "inverted"),
     }
     monkeypatch.setattr(stability, "_judged", lambda: table)
-    monkeypatch.setattr(stability, "_dense", lambda: judged("oblique", "inverted")[1])
+    monkeypatch.setattr(stability, "_steep", lambda: judged("oblique", "inverted")[1])
     return table, judged
 
 

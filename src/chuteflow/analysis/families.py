@@ -101,7 +101,9 @@ def _add_solved(knots: list[Knot], within: Range, found: list[TracedFamily], *, 
                 if len(family.solutions) > 1:
                     found.append(family)
             return
-    raise SolveError("a family seen in the search could not be entered: narrow the range searched")
+    # Of a family that is known, a piece torn off may be too rough to lead back to it.
+    if not any(family.passes(knots) for family in found):
+        raise SolveError("a family seen in the search could not be entered: narrow the range searched")
 
 
 def _from_middle(count: int) -> list[int]:

@@ -112,6 +112,15 @@ class TracedFamily:
         chords = np.hypot(*np.diff(self.macroscopic[:, LOG_M:], axis=0).T)
         return np.concatenate([[0.0], np.cumsum(chords)])
 
+    def passes(self, knots: Sequence[Knot]) -> bool:
+        """Whether the family passes near all of these rough flows, in the plane (ln M, ln T_surface)."""
+        plane, rough = _plane(self.solutions), _plane(knots)
+        chords = np.diff(plane, axis=0)
+        gap = rough[:, None] - plane[:-1]
+        sigma = np.clip((gap * chords).sum(axis=-1) / np.maximum((chords**2).sum(axis=1), 1e-300), 0.0, 1.0)
+        beside = np.linalg.norm(gap - sigma[..., None] * chords, axis=-1).min(axis=1)
+        return bool(beside.max() < _ASTRAY)
+
     def holds(self, solution: Solution) -> bool:
         """Whether a solved flow is of this family: on one of its chords lies a flow equal to it."""
         plane = self.macroscopic[:, LOG_M:]

@@ -26,6 +26,8 @@ RANGE, _SHORTEST = (1e-3, 10.0), np.pi
 _SCAN, _ANGLES = 14, (0.0, 30.0, 60.0, 90.0)
 #: Other peaks of the scan are climbed too if they reach this share of the highest.
 _RIVAL = 0.5
+#: A climb is begun anew at most so often, and only while it gains more than this share.
+_ANEW, _GAIN = 4, 1e-3
 #: Accuracy of ln k and a at a peak: rates are flat there.
 _PRECISION = 1e-3
 #: Longest step in ln k and the angle in which a mode is followed.
@@ -158,7 +160,23 @@ class _Search:
             yield _Peak(float(logs[i]), float(angles[j]), complex(sigma[i, j]))
 
     def _summit(self, peak: _Peak) -> Mode | None:
-        """The mode at the summit that ``peak`` leads to."""
+        """The mode at the summit that ``peak`` leads to.
+
+        A climb in the plane may end on the way: from there it is begun anew, until it gains no more.
+        """
+        mode = self._ascended(peak)
+        for _ in range(_ANEW):
+            if mode is None or self.fixed != (None, None) or 0.0 in (mode.kx, mode.ky):
+                break
+            here = float(np.log(np.hypot(mode.kx, mode.ky))), float(np.arctan2(mode.ky, mode.kx))
+            higher = self._ascended(_Peak(*here, mode.sigma))
+            if higher is None or higher.growth < (1.0 + _GAIN) * mode.growth:
+                break
+            mode = higher
+        return mode
+
+    def _ascended(self, peak: _Peak) -> Mode | None:
+        """The mode at the end of one climb from ``peak``."""
         mode = self._exact(*self._climbed(peak, self._along_the_mode(peak)))
         if mode is None or mode.growth < peak.sigma.real - mode.error:
             # Another mode was taken for the one followed: climb by that which leads at each place.

@@ -72,7 +72,9 @@ class Base:
 
 
 #: Order of the fields of a fan.
-FIELDS = HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST = range(7)
+FIELDS = HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST, SURE_LOW, SURE_HIGH, SURE_STEEP = range(
+    10
+)
 #: Order of what ``down`` and ``across`` of a fan hold the derivatives of.
 DERIVED = EXCESS, GRIPPED, OF_FLUX, OF_SLIP, OF_GLIDE = range(5)
 
@@ -84,8 +86,9 @@ class Fan:
     ``gaps`` (C - 1,) are the distances of neighbouring columns, 1 between those of the range searched, halved by
     each birth; ``place`` (T,) are the columns at the temperatures asked for; ``last`` (C,) the rows at which they
     end. The other arrays are (K, C): ``excess`` is y - s^2 shear and ``grip`` G; ``log_mass`` is ln M. ``fields``
-    (7, K, C) are by the names of FIELDS y; ln M; the logarithm of M sqrt(T), which times F1 is the flux at the slip
-    velocity; that of the flux by shear; the least and the largest net loss, and the largest v so far down.
+    (10, K, C) are by the names of FIELDS y; ln M; the logarithm of M sqrt(T), which times F1 is the flux at the slip
+    velocity; that of the flux by shear; the least and the largest net loss, and the largest v so far down; and these
+    three again as far as they are sure where a trajectory was born.
     ``down`` and ``across`` (5, K, C) are the derivatives of y - s^2 shear, G and three of the fields, by the names
     of DERIVED, to the logarithm of p and from column to column, to a positive factor at each point.
     ``spacing`` is that of ln T for a gap of 1.
@@ -137,6 +140,8 @@ class _Grown:
 
     ``order`` (C,) are the numbers of the columns, in which those that were born come last; ``gaps`` (C - 1,). The
     first ``thin`` rows lie close to the surface; ``p1`` is where the rows turn from logarithmic to even in p.
+    ``blurred`` (C,) are the rows from which a trajectory is known no better than neighbours part, since it was born
+    there, or one that it was born from.
     """
 
     states: Array
@@ -144,6 +149,7 @@ class _Grown:
     gaps: Array
     thin: int
     p1: float
+    blurred: NDArray[np.intp]
 
 
 @lru_cache(maxsize=4)
@@ -249,12 +255,14 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
     for k, row in enumerate(rows):
         states[k, :, : row.shape[1]] = row
     first = len(temperature)
+    blurred = np.full(len(order), len(rows))
     for k, sources, weights in births:
         depth, count = k + len(thin) - top, sources.shape[1]
         history = states[:depth][:, :, sources]  # (depth, 4, 4, births)
         states[:depth, :, first : first + count] = np.moveaxis(_mean(np.moveaxis(history, 1, 0), weights), 0, 1)
+        blurred[first : first + count] = np.minimum(depth, blurred[sources].min(axis=0))
         first += count
-    return _Grown(states[:, :, order], order, gaps, len(thin), p1)
+    return _Grown(states[:, :, order], order, gaps, len(thin), p1, blurred[order])
 
 
 def _thin_rows(
@@ -380,6 +388,7 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     slope = problem.slope
     closures = _table(problem)
     net = closures[LOSS] - slope**2 * closures[WORK]
+    in_balance = float(np.abs(np.gradient(net)[np.abs(net).argmin()])) * _SCALE
     wanted = [*closures[[SHEAR, GRIP]], *np.gradient(closures[[SHEAR, GRIP]], axis=1) * _SCALE]
     wanted += [*closures[[WORK, GAMMA, COUPLING]], net, 1.0 / closures[CONDUCTION]]
     shear, grip, shear_slope, grip_slope, work, gamma, k, net, inverse = _interpolated(
@@ -401,6 +410,9 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     cooling = p * net - y * (1.0 + 0.5 * warming)  # dy
     down = [cooling - slope**2 * shear_slope * still, grip_slope * still, cooling]
     down += [p / over + 0.5 * warming, rate * p / glide]
+    # Neighbours may have parted by so much before one is born between them.
+    blurred = (np.arange(len(p))[:, None] >= grown.blurred) * math.exp(_LENGTHS_PER_STEP)
+    of_net, of_turn = blurred * (_APART * in_balance), blurred * (_APART_IN_FLUX * p * inverse)
     return Fan(
         slope=slope,
         gaps=grown.gaps,
@@ -418,6 +430,9 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
                 np.minimum.accumulate(net, axis=0),
                 np.maximum.accumulate(net, axis=0),
                 np.maximum.accumulate(turn, axis=0),
+                np.minimum.accumulate(net + of_net, axis=0),
+                np.maximum.accumulate(net - of_net, axis=0),
+                np.maximum.accumulate(turn - of_turn, axis=0),
             ]
         ),
         down=np.stack(down),

@@ -23,6 +23,9 @@ from chuteflow.analysis.domains.fan import (
     OF_GLIDE,
     OF_SLIP,
     STEEPEST,
+    SURE_HIGH,
+    SURE_LOW,
+    SURE_STEEP,
     Base,
     Fan,
     lagrange,
@@ -84,8 +87,8 @@ def kinds(fan: Fan, base: Base) -> Kinds:
         part = slice(first, last)
         pieces.append(_monotonic_pieces(zeros.log_t[part], fields[LOG_MASS, part], log_flux[part], rise[part]))
         holdup = np.exp(fields[LOG_MASS, part])
-        interior |= _interiors(fields[NET_LOW, part], fields[NET_HIGH, part], zeros.doubt[:, part], holdup)
-        density |= _densities(fields[STEEPEST, part], zeros.doubt[2, part], holdup)
+        interior |= _interiors(fields[:, part], zeros.doubt[:, part], holdup)
+        density |= _densities(fields[:, part], zeros.doubt[2, part], holdup)
     return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
 
 
@@ -161,7 +164,7 @@ def _selected(line: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Zeros:
-    """What there is at k points of the zero set: ``fields`` (7, k), ``down`` and ``across`` (5, k) of a fan there,
+    """What there is at k points of the zero set: ``fields`` (10, k), ``down`` and ``across`` (5, k) of a fan there,
     ``log_t`` (k,), and how far the net losses and the largest v are in ``doubt`` (3, k)."""
 
     fields: Array
@@ -204,9 +207,10 @@ def _at_zeros(fan: Fan, excess: Array, line: Array) -> _Zeros:
     values = fan.fields[:, r, c]
     fields = (values * weights).sum(axis=1)
     # Where there is no cubic, half of what lies between the ends of an edge; else what the cubic differs by.
-    ends = values[NET_LOW:, aside, here], values[NET_LOW:, aside + 1, here]
+    doubtful = slice(NET_LOW, STEEPEST + 1)
+    ends = values[doubtful, aside, here], values[doubtful, aside + 1, here]
     chord = ends[0] + share * (ends[1] - ends[0])
-    doubt = np.where(even, np.abs(fields[NET_LOW:] - chord), 0.5 * np.abs(ends[1] - ends[0]))
+    doubt = np.where(even, np.abs(fields[doubtful] - chord), 0.5 * np.abs(ends[1] - ends[0]))
     log_t = fan.spacing * np.append(0.0, np.cumsum(fan.gaps))
     pair = r[aside, here], c[aside, here], r[aside + 1, here], c[aside + 1, here]
 
@@ -285,27 +289,27 @@ def _most(pieces: Array) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def _interiors(low: Array, high: Array, doubt: Array, holdup: Array) -> int:
+def _interiors(fields: Array, doubt: Array, holdup: Array) -> int:
     """Bits of INTERIORS; a net loss whose sign is in ``doubt`` (2 or more, k) does not make a flow mixed."""
     found = 0
-    scale = max(float(np.abs(low).max()), float(np.abs(high).max()))
+    scale = float(np.abs(fields[[NET_LOW, NET_HIGH]]).max())
     rounding = _BALANCE * scale * (1.0 + holdup / _DEEP)
-    low, high = low + (doubt[0] + rounding), high - (doubt[1] + rounding)
-    if _peak(low) >= 0.0:
+    gain, loss = doubt[0] + rounding, doubt[1] + rounding
+    if _peak(fields[NET_LOW] + gain) >= 0.0:
         found |= INTERIORS["dissipative"]
-    if _peak(-high) >= 0.0:
+    if _peak(loss - fields[NET_HIGH]) >= 0.0:
         found |= INTERIORS["productive"]
-    if _peak(np.minimum(-low, high)) > 0.0:
+    if _peak(np.minimum(-fields[SURE_LOW] - gain, fields[SURE_HIGH] - loss)) > 0.0:
         found |= INTERIORS["mixed"]
     return found
 
 
-def _densities(steepest: Array, doubt: Array, holdup: Array) -> int:
+def _densities(fields: Array, doubt: Array, holdup: Array) -> int:
     """Bits of DENSITIES; a rise that is in ``doubt`` (k,) does not make a density inverted."""
     found = 0
-    if _peak(1.0 - steepest) >= 0.0:
+    if _peak(1.0 - fields[STEEPEST]) >= 0.0:
         found |= DENSITIES["monotonic"]
-    if _peak(steepest - doubt - 1.0 - _RISE * holdup) > 0.0:
+    if _peak(fields[SURE_STEEP] - doubt - 1.0 - _RISE * holdup) > 0.0:
         found |= DENSITIES["inverted"]
     return found
 
