@@ -14,6 +14,7 @@ from chuteflow.analysis.boundaries.seeds import FOLDS
 from chuteflow.analysis.boundaries.tracing import TURNS
 from chuteflow.analysis.results import KINDS
 from chuteflow.faces.contract import PLACE
+from chuteflow.faces.plots import PARAMETERS
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.paper import style
 from chuteflow.steady.quantities import NUMBERS
@@ -22,13 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Names and symbols of the parameters.
-_SYMBOLS = {
-    "slope": ("slope", r"\tan\theta"),
-    "restitution": ("restitution", "e"),
-    "wall_restitution": ("wall restitution", "e_w"),
-    "roughness": ("roughness", "r"),
-}
 #: Markers of turning points.
 _MARKERS = {"cusp": "*", "birth": "o", "crossing": "X", "turn": "s"}
 #: Kinds of flows are written so many points beside a boundary, at this share of its way.
@@ -62,7 +56,7 @@ def plot_boundaries(found: BoundarySet, quantity: str = "mass_flux") -> Figure:
     for edge in edges:
         ax.plot(edge.parameter, getattr(edge, quantity), zorder=1, **_LIMIT.line(0.9))
     ax.set(xlim=box[0], ylim=box[1])
-    name, symbol = _SYMBOLS[found.second]
+    name, symbol = PARAMETERS[found.second]
     style.name_axes(ax, f"{name}, ${symbol}$", style.label(quantity))
     style.caption(figure, f"{KINDS[found.kind]}\n{_others(found)}")
     key = list(_key(found, edges, quantity))
@@ -146,7 +140,7 @@ def _others(found: BoundarySet) -> str:
     """The other parameters, in words and symbols."""
     said = [
         rf"${symbol} = {getattr(found.chute, name):.4g}$"
-        for name, (_, symbol) in _SYMBOLS.items()
+        for name, (_, symbol) in PARAMETERS.items()
         if name != found.second
     ]
     surface = {"free": "free surface", "interface": "interface"}[found.chute.surface]

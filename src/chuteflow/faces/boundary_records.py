@@ -14,14 +14,11 @@ from typing import Any
 from chuteflow import __version__
 from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning
 from chuteflow.faces import contract
-from chuteflow.faces.contract import PARAMETERS, PLACE, finite
+from chuteflow.faces.contract import PLACE, SHORT, finite
 from chuteflow.faces.references import PAPER, numbers_are
 from chuteflow.faces.writing import require_writable, written_beside
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
-
-#: The short names of parameters, by those of Chute.
-SHORT = {long: short for short, long in PARAMETERS.items()}
 
 
 def boundaries_object(found: BoundarySet) -> dict[str, Any]:

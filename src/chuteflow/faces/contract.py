@@ -24,6 +24,8 @@ PARAMETERS = {
     "surface": "surface",
     "closure": "closure",
 }
+#: The same the other way round.
+SHORT = {long: short for short, long in PARAMETERS.items()}
 #: The numbers that place a flow on a curve.
 PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 

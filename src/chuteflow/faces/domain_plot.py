@@ -9,19 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.domains import Boundary, Domain
+from chuteflow.faces.plots import PARAMETERS
 from chuteflow.paper import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Labels of the parameters on axes.
-_LABELS = {
-    "slope": r"slope, $\tan\theta$",
-    "restitution": "restitution, $e$",
-    "wall_restitution": "wall restitution, $e_w$",
-    "roughness": "roughness, $r$",
-}
 #: Fills for 0, 1, 2, ... flows that share one flux; the last stands for more too.
 _COUNTS = ("#ffffff", "#e3eef8", "#bcd7ee", "#86b5dc", "#5590c4", "#2f6ba5")
 #: Fills for monotonic densities alone, inverted ones alone, and both, by the sum of their bits.
@@ -71,7 +65,7 @@ def plot_domain(found: Domain) -> Figure:
     _kind_panel(axes[1], found)
     plane = found.plane
     for ax in axes:
-        style.name_axes(ax, _LABELS[plane.x.name], _LABELS[plane.y.name] if ax is axes[0] else None)
+        style.name_axes(ax, _axis_label(plane.x.name), _axis_label(plane.y.name) if ax is axes[0] else None)
         ax.set_xlim(plane.x.low, plane.x.high)
         ax.set_ylim(plane.y.low, plane.y.high)
     style.caption(figure, _others(found))
@@ -79,11 +73,16 @@ def plot_domain(found: Domain) -> Figure:
     return figure
 
 
+def _axis_label(parameter: str) -> str:
+    words, symbol = PARAMETERS[parameter]
+    return f"{words}, ${symbol}$"
+
+
 def _others(found: Domain) -> str:
     plane = found.plane
     said = [
-        rf"{label.split(', ')[1]} $= {getattr(plane.chute, name):.4g}$"
-        for name, label in _LABELS.items()
+        rf"${symbol} = {getattr(plane.chute, name):.4g}$"
+        for name, (_, symbol) in PARAMETERS.items()
         if name not in (plane.x.name, plane.y.name)
     ]
     surface = {"free": "free surface", "interface": "interface"}[plane.chute.surface]

@@ -21,14 +21,12 @@ from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
 from chuteflow.analysis.ranges import Range
 from chuteflow.errors import InputError
 from chuteflow.faces import contract
-from chuteflow.faces.contract import PARAMETERS
+from chuteflow.faces.contract import SHORT
 from chuteflow.faces.records import chute_from, require_format
 from chuteflow.faces.references import PAPER, numbers_are
 
 TITLE = "domains of existence of steady, fully developed flows of grains down a chute"
 KIND, FORMAT = "domain", 1
-#: The short names of parameters, by those of Chute.
-SHORT = {long: short for short, long in PARAMETERS.items()}
 #: More cells than this are not printed with an object.
 MOST_CELLS = 10_000
 _RESTORE = "# restore: "

@@ -63,6 +63,19 @@ class Interval(click.ParamType):
         return low, high
 
 
+class NumberOrInterval(click.ParamType):
+    """A plain number, or two as LO:HI."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | tuple[float, float]:
+        """The number, or both ends."""
+        kind = Interval() if ":" in str(value) else Number()
+        return kind.convert(value, param, ctx)
+
+
 def option(*names: str, **settings: Any) -> Callable[[Command], Command]:
     """An option that may be given once."""
 

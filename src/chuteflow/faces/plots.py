@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 
 #: Endings that figures are written with.
 SUFFIXES = (".png", ".pdf", ".svg")
+#: Words and symbols of the parameters of a chute.
+PARAMETERS = {
+    "slope": ("slope", r"\tan\theta"),
+    "restitution": ("restitution", "e"),
+    "wall_restitution": ("wall restitution", "e_w"),
+    "roughness": ("roughness", "r"),
+}
 _FIELDS = ("volume_fraction", "granular_temperature", "velocity")
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"), ("mass_holdup", "centre_of_mass"))
 _POINTS = 401

@@ -24,19 +24,6 @@ _EPILOG = (
 )
 
 
-class NumberOrRange(click.ParamType):
-    """A plain number, or two as LO:HI."""
-
-    name = "number"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float | tuple[float, float]:
-        """The number, or both ends."""
-        kind = options.Interval() if ":" in str(value) else options.Number()
-        return kind.convert(value, param, ctx)
-
-
 class Plane(click.ParamType):
     """The second parameter and the number on the vertical axis."""
 
@@ -62,11 +49,13 @@ class Plane(click.ParamType):
     help="What to follow: fold-Q (the default), fold-M, fold-T, density-inversion or interior-change.",
 )
 @options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
-@options.option("--slope", type=NumberOrRange(), help="Slope tan(theta); LO:HI where it is the second parameter.")
+@options.option(
+    "--slope", type=options.NumberOrInterval(), help="Slope tan(theta); LO:HI where it is the second parameter."
+)
 @options.option("--angle", type=options.Number(), help="Inclination theta in degrees, instead of --slope.")
-@options.option("--e", type=NumberOrRange(), help="Restitution e of two grains; or LO:HI.")
-@options.option("--ew", type=NumberOrRange(), help="Restitution e_w of a grain and the base; or LO:HI.")
-@options.option("--roughness", type=NumberOrRange(), help="Roughness r of the base; or LO:HI.")
+@options.option("--e", type=options.NumberOrInterval(), help="Restitution e of two grains; or LO:HI.")
+@options.option("--ew", type=options.NumberOrInterval(), help="Restitution e_w of a grain and the base; or LO:HI.")
+@options.option("--roughness", type=options.NumberOrInterval(), help="Roughness r of the base; or LO:HI.")
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
 @options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")

@@ -12,7 +12,6 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.faces.commands.boundary import NumberOrRange
 
 if TYPE_CHECKING:
     from chuteflow.analysis.domains import Domain
@@ -53,11 +52,11 @@ class Numbers(click.ParamType):
 
 
 @click.command("domain", help=COMMANDS["domain"], epilog=_EPILOG)
-@options.option("--slope", type=NumberOrRange(), help="Slope tan(theta); LO:HI puts it on an axis.")
+@options.option("--slope", type=options.NumberOrInterval(), help="Slope tan(theta); LO:HI puts it on an axis.")
 @options.option("--angle", type=options.Number(), help="Inclination theta in degrees, instead of --slope.")
-@options.option("--e", type=NumberOrRange(), help="Restitution e of two grains; or LO:HI.")
-@options.option("--ew", type=NumberOrRange(), help="Restitution e_w of a grain and the base; or LO:HI.")
-@options.option("--roughness", type=NumberOrRange(), help="Roughness r of the base; or LO:HI.")
+@options.option("--e", type=options.NumberOrInterval(), help="Restitution e of two grains; or LO:HI.")
+@options.option("--ew", type=options.NumberOrInterval(), help="Restitution e_w of a grain and the base; or LO:HI.")
+@options.option("--roughness", type=options.NumberOrInterval(), help="Roughness r of the base; or LO:HI.")
 @options.option("--size", type=Size(), help="Cells along x and y; 400x400 by default.")
 @options.option("--temperature", type=Numbers(), help="Surface temperatures at which to look for flows, as 1,10,100.")
 @options.option(
@@ -134,7 +133,8 @@ def _clear() -> None:
 
 def _report(found: Domain) -> Iterator[str]:
     from chuteflow.faces import tables, words
-    from chuteflow.faces.domain_records import BITS, CLASSES, SHORT, shares
+    from chuteflow.faces.contract import SHORT
+    from chuteflow.faces.domain_records import BITS, CLASSES, shares
 
     plane = found.plane
     x, y = plane.x, plane.y
