@@ -14,7 +14,7 @@ from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refi
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
-from chuteflow.steady.solver import Solution
+from chuteflow.steady.solver import Solution, in_parts
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
@@ -341,12 +341,12 @@ def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
     """The flows of many ``solutions`` on ``chute``; what their kinds are told from is computed side by side."""
     flows = [Flow(chute, solution) for solution in solutions]
     for degree in {solution.problem.degree for solution in solutions}:
-        members = [flow for flow in flows if flow.solution.problem.degree == degree]
-        stretches = np.array([[flow.solution.problem.stretch] for flow in members])
-        problem = Collocation(members[0].solution.problem.model, degree, stretches)
-        samples = _samples_of(problem.state(np.array([flow.solution.z for flow in members])))
-        for i, flow in enumerate(members):
-            vars(flow)["_samples"] = {name: values[i] for name, values in samples.items()}
+        for members in in_parts([flow for flow in flows if flow.solution.problem.degree == degree]):
+            stretches = np.array([[flow.solution.problem.stretch] for flow in members])
+            problem = Collocation(members[0].solution.problem.model, degree, stretches)
+            samples = _samples_of(problem.state(np.array([flow.solution.z for flow in members])))
+            for i, flow in enumerate(members):
+                vars(flow)["_samples"] = {name: values[i] for name, values in samples.items()}
     return flows
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,10 @@ _FLOOR, _NOISE = 1e-12, 2e-14
 _STEP = 1e-7
 #: Iterations of flows side by side before the rest are solved one by one, and the longest step there.
 _MOST_SIDE_BY_SIDE, _FAR = 6, 3.0
+#: Flows that are treated side by side at most.
+_TOGETHER = 256
+
+Item = TypeVar("Item")
 
 
 class Status(Enum):
@@ -129,6 +134,12 @@ def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float
             return Solution(problem, z, fine, float(error), Status.CONVERGED)
 
 
+def in_parts(members: list[Item]) -> Iterator[list[Item]]:
+    """As many members at a time as are treated side by side: more would take memory and no less time."""
+    for first in range(0, len(members), _TOGETHER):
+        yield members[first : first + _TOGETHER]
+
+
 def solve_many(
     starts: Sequence[tuple[Collocation, Array]], conditions: Sequence[Condition], tolerance: float = TOLERANCE
 ) -> list[Solution]:
@@ -141,9 +152,9 @@ def solve_many(
     pending = dict(enumerate(starts))
     for degree, finer in pairwise(DEGREES):
         members = [i for i, (problem, _) in pending.items() if problem.degree == degree]
-        if members:
-            pending |= _side_by_side(members, pending, finer, conditions, tolerance, out)
-            pending = {i: start for i, start in pending.items() if i not in out}
+        for some in in_parts(members):
+            pending |= _side_by_side(some, pending, finer, conditions, tolerance, out)
+        pending = {i: start for i, start in pending.items() if i not in out}
     for i, (problem, z) in pending.items():
         out[i] = solve(problem, z, conditions[i], tolerance)
     return [out[i] for i in range(len(starts))]
