@@ -1,9 +1,11 @@
 """All flows of a chute: the paper's, hidden families, extreme values, and why there is none."""
 
+import time
+
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, curve, flows
+from chuteflow import Chute, InputError, SolveError, curve, flows
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 
@@ -153,3 +155,11 @@ def test_a_flow_just_beyond_the_range_extends_it():
     (found,) = flows(chute, Q=344.3168597509368)
     assert found.surface_temperature == pytest.approx(1.0037e5, rel=1e-3)
     assert flows(chute, Q=344.3168597509368).searched.surface_temperature[1] > found.surface_temperature
+
+
+def test_a_holdup_at_which_the_finest_grid_loses_a_family_is_refused_soon():
+    chute = Chute(slope=0.6, restitution=1.0 / 3.0, wall_restitution=0.0, roughness=0.8660254037844386)
+    begin = time.process_time()
+    with pytest.raises(SolveError, match="too sharp for the finest grid beyond a hold-up of"):
+        flows(chute, M=300.0)
+    assert time.process_time() - begin < 20.0

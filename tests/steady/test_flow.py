@@ -202,3 +202,9 @@ def test_gravity_pays_for_all_of_it_on_the_half_line():
         b = flow.energy_budget
         assert b.slip_work + b.shear_work == pytest.approx(0.3 * flow.mass_flux, rel=1e-9)
         assert b.base_loss > 0.0
+
+
+def test_nothing_is_denser_than_the_densest_where_grains_are_packed_to_the_last():
+    flow = flows(Chute(0.3, 1.0, 0.0, 0.5), Q=1e-6)[-1]
+    assert flow.base_volume_fraction > 0.6199
+    assert flow.base_volume_fraction <= flow.largest_volume_fraction

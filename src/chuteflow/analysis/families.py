@@ -55,10 +55,14 @@ class Family:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def families(model: Model, within: Range) -> tuple[Family, ...]:
+def families(model: Model, within: Range, resolved_to: float = 0.0) -> tuple[Family, ...]:
     """Every family of flows in the range: as chains of rough flows, or traced where a chain is torn.
 
     Those of the last few chutes are remembered: one asks for other flows of the same chute next.
+
+    Raises:
+        SolveError: where the finest grid does not resolve one up to the hold-up ``resolved_to``, or one could not be
+            entered, or too many would have to be traced.
     """
     whole: list[Family] = []
     torn: list[TracedFamily] = []
@@ -66,6 +70,12 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
         knots = scene.knots(chain)
         if chain.torn:
             _add_solved(knots, within, torn, whole=False)
+            lost = float(np.exp(min((family.lost for family in torn), default=np.inf)))
+            if lost < resolved_to:
+                raise SolveError(
+                    f"a family of deep flows is too sharp for the finest grid beyond a hold-up of {lost:.4g}: "
+                    "ask for a smaller one"
+                )
         else:
             whole.append(Family(tuple(knots), False))
     return (*whole, *(Family(tuple(map(Knot.at, t.solutions)), True) for t in torn))

@@ -20,6 +20,8 @@ from chuteflow.steady.solver import DEGREES, Condition, Solution, Status, defaul
 
 #: Decay of the coefficients between which a grid is kept while tracing.
 _RESOLVED, _WASTED = 1e-7, 1e-13
+#: Decay on the finest grid beyond which a family is followed no further, and what is said then.
+_LOST, LOST = 1e-3, "the finest grid does not resolve it further"
 #: The stretch is renewed when it is off by more.
 _STRETCH_OFF = 0.3
 #: Relative error allowed in the flows at the edges of a range while tracing.
@@ -111,6 +113,12 @@ class TracedFamily:
         """In the plane (ln M, ln T_surface) from the first flow, by chords, (k,)."""
         chords = np.hypot(*np.diff(self.macroscopic[:, LOG_M:], axis=0).T)
         return np.concatenate([[0.0], np.cumsum(chords)])
+
+    @property
+    def lost(self) -> float:
+        """ln M from which on the finest grid does not resolve it; infinite where it is followed to its ends."""
+        there = [self.macroscopic[i, LOG_M] for i, words in zip((0, -1), self.ends, strict=True) if words == LOST]
+        return float(min(there, default=np.inf))
 
     def passes(self, knots: Sequence[Knot]) -> bool:
         """Whether the family passes near all of these rough flows, in the plane (ln M, ln T_surface)."""
@@ -282,7 +290,15 @@ def _side(start: Solution, ahead: Array, within: Range, control: Control) -> tup
             return solutions, words, False
         if len(points) > 3 and _returned(points):
             return solutions[:-1], "the family closes on itself", True
-    return solutions, path.status.value, False
+        if _decay(solutions[-1]) > _LOST:
+            return solutions, LOST, False
+    return solutions, LOST if solutions[-1].problem.degree == DEGREES[-1] else path.status.value, False
+
+
+def _decay(solution: Solution) -> float:
+    """Of the coefficients of a solution on the finest grid; on coarser ones none, since there is a finer one."""
+    finest = solution.problem.degree == DEGREES[-1]
+    return tail(solution.problem.grid, solution.state.y + 1e-30) if finest else 0.0
 
 
 def _at_edge(inside: Solution, outside: Solution, axis: int, edge: float) -> Solution:

@@ -260,6 +260,11 @@ class Flow:
     @cached_property
     def _share_of_largest(self) -> Array:
         """Share of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
+        # Where grains are packed almost densest, samples alone do not tell.
+        return max(self._largest_sampled(), np.ones(1), key=lambda share: self._log_density(float(share[0])))
+
+    def _largest_sampled(self) -> Array:
+        """Where nu is largest beside the largest of the samples."""
         share, nu = self._samples["share"], self._samples["nu"]
         k = int(np.argmax(nu))
         if k in (0, len(nu) - 1):

@@ -22,7 +22,7 @@ LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Acc
 #: The error claimed is this many times the change from one accuracy to the next.
 SAFETY = 2.0
 #: The least error ever claimed, and in the tolerance of a step: two integrations may agree by chance.
-_FLOOR, _CHANCE = 1e-12, 0.3
+_FLOOR, _CHANCE = 1e-12, 0.5
 #: The finer integrations end a little below the last flow.
 _BELOW = 1.02
 
