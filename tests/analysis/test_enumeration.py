@@ -163,3 +163,13 @@ def test_a_holdup_at_which_the_finest_grid_loses_a_family_is_refused_soon():
     with pytest.raises(SolveError, match="too sharp for the finest grid beyond a hold-up of"):
         flows(chute, M=300.0)
     assert time.process_time() - begin < 20.0
+
+
+def test_where_families_are_many_already_the_range_is_not_extended():
+    chute = Chute(0.6, 0.4105827264455308, 0.0, 0.8660254037844386, closure="lun-fourier")
+    begin = time.process_time()
+    found = flows(chute, Q=1e-6)
+    assert time.process_time() - begin < 20.0
+    assert not len(found)
+    assert found.searched.surface_temperature == (1e-3, 1e5)
+    assert found.reason is not None

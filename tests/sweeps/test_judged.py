@@ -18,17 +18,18 @@ STUDY = {
 }
 
 
-def test_a_study_keeps_the_verdict_of_each_flow():
-    study = from_dict(STUDY, Path())
+@pytest.mark.parametrize(("temperature", "stable"), [(0.2, 0), pytest.param(1.7, 1, marks=pytest.mark.slow)])
+def test_a_study_keeps_the_verdict_of_each_flow(temperature, stable):
+    study = from_dict({**STUDY, "parameters": {**STUDY["parameters"], "T_surface": temperature}}, Path())
     assert study.chunk == 16
     solved = solve_chunk(study, 0)
     assert solved.n_flows.tolist() == [0, 1]
     assert solved.reason[0] > 0
-    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), T_surface=1.7)[0]
+    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), T_surface=temperature)[0]
     found = stability_of(flow)
     kept = {name: values[1, 0] for name, values in solved.quantities.items()}
     assert kept["mass_flux"] == pytest.approx(flow.mass_flux)
-    assert kept["stable"] == found.stable == 1
+    assert kept["stable"] == found.stable == stable
     assert found.mode is not None
     assert JUDGED_KINDS["mode"][kept["mode"]] == found.mode.direction
     assert (kept["growth"], kept["kx"], kept["ky"]) == pytest.approx((found.mode.growth, found.mode.kx, found.mode.ky))

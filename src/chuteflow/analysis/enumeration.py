@@ -13,7 +13,7 @@ import numpy as np
 
 from chuteflow.analysis.crossings import crossings
 from chuteflow.analysis.existence import reason_for_none
-from chuteflow.analysis.families import Family, families
+from chuteflow.analysis.families import MOST_TRACED, Family, families
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.analysis.results import FlowSet, Searched
 from chuteflow.errors import InputError, SolveError
@@ -28,6 +28,8 @@ _EXTENSIONS = 4
 _LEADS = 0.25
 #: The range is not extended to larger hold-ups where there are more traced families: their number would grow.
 _MOST_DEEPER = 3
+#: With more of them it is not extended at all: there would soon be more than can be traced.
+_MOST_WIDER = MOST_TRACED - 4
 #: Flows whose ln M and ln T_surface differ by less are one flow.
 _SAME = 1e-7
 #: The range reaches this factor beyond a flow that was found just outside.
@@ -73,7 +75,7 @@ def flows(
     search = _search(problem, which, value, tolerance, within)
     for _ in range(_EXTENSIONS):
         wider = _wider(search, which, value)
-        if wider == search.within:
+        if wider == search.within or sum(family.traced for family in search.families) > _MOST_WIDER:
             break
         try:
             search = _search(problem, which, value, tolerance, wider)

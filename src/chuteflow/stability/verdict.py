@@ -166,7 +166,7 @@ class _Search:
         """
         mode = self._ascended(peak)
         for _ in range(_ANEW):
-            if mode is None or self.fixed != (None, None) or 0.0 in (mode.kx, mode.ky):
+            if mode is None or mode.growth <= 0.0 or self.fixed != (None, None) or 0.0 in (mode.kx, mode.ky):
                 break
             here = float(np.log(np.hypot(mode.kx, mode.ky))), float(np.arctan2(mode.ky, mode.kx))
             higher = self._ascended(_Peak(*here, mode.sigma))
