@@ -10,7 +10,7 @@ from chuteflow.analysis.domains.plane import code
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
 
-from .domain_points import compare
+from .domain_points import compare, enumerated, random_planes
 
 TEMPERATURES = (1.0, 10.0, 100.0)
 
@@ -84,6 +84,14 @@ def test_points_are_classified_as_by_the_full_enumeration(surface, seed, count):
     _near, far, unknown = compare(seed, count, 2e-3, surface)
     assert not far
     assert not unknown
+
+
+@pytest.mark.parametrize(("seed", "slope"), [(103, 0.4368441269246962), (104, 0.47473192667213815)])
+def test_what_deep_trajectories_show_by_interpolation_alone_is_no_kind(seed, slope):
+    plane, place = next(
+        point for point in random_planes(seed) if point[0].chute_at(*point[1]).slope == pytest.approx(slope, rel=1e-12)
+    )
+    assert code(plane, *place) == enumerated(plane.chute_at(*place))
 
 
 @pytest.mark.slow

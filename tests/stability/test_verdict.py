@@ -131,3 +131,11 @@ def test_what_grows_in_random_flows_grows_on_another_family_of_maps(seed, count)
             assert found.mode is not None
             assert seen_again(found.mode) < 0.01 * found.mode.growth
     assert told > 0.9 * count
+
+
+def test_a_climb_goes_on_from_where_it_stopped_on_the_way():
+    (flow,) = chuteflow.flows(Chute(0.163, 0.972, 0.557, 0.641), T_surface=10.5)
+    beside = leading(Disturbances(flow), 0.00286, 0.0524)[0]
+    mode = stability_of(flow).mode
+    assert mode is not None
+    assert mode.growth >= beside.growth > 0.013

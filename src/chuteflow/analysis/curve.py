@@ -1,7 +1,8 @@
 """Every family of flows of a chute as an ordered branch, with its special points located.
 
-Families are entered from the landscape of trajectories, so that none is missed, and followed through folds
-in Q, M and T_surface by the general continuation of :mod:`chuteflow.numerics.continuation`.
+Families are entered from the landscape of trajectories, so that none is missed, and solved side by side where it shows
+them whole, or followed through folds in Q, M and T_surface by the general continuation of
+:mod:`chuteflow.numerics.continuation`.
 """
 
 from __future__ import annotations

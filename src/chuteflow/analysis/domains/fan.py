@@ -72,9 +72,8 @@ class Base:
 
 
 #: Order of the fields of a fan.
-FIELDS = HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST, SURE_LOW, SURE_HIGH, SURE_STEEP = range(
-    10
-)
+FIELDS = range(10)
+HEAT_FLUX, LOG_MASS, LOG_SLIP, LOG_GLIDE, NET_LOW, NET_HIGH, STEEPEST, SURE_LOW, SURE_HIGH, SURE_STEEP = FIELDS
 #: Order of what ``down`` and ``across`` of a fan hold the derivatives of.
 DERIVED = EXCESS, GRIPPED, OF_FLUX, OF_SLIP, OF_GLIDE = range(5)
 
