@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chuteflow import display
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.constitutive import Field
@@ -43,6 +44,13 @@ class HotModel:
     solution: HotSolution | None
     reason: str | None
     slope_bounds: SlopeBounds | None
+
+    def __repr__(self) -> str:
+        numbers = {"lambda": self.parameters.lambda_, "delta": self.parameters.delta}
+        if self.mass_holdup is None:
+            return display.line("HotModel", self.reason, **numbers)
+        density = "inverted" if self.inverted else "monotonic"
+        return display.line("HotModel", f"{self.interior}, density {density}", **numbers, M=self.mass_holdup)
 
     @property
     def exists(self) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
 PARAMETERS = {
@@ -26,8 +26,6 @@ PARAMETERS = {
 }
 #: The same the other way round.
 SHORT = {long: short for short, long in PARAMETERS.items()}
-#: The numbers that place a flow on a curve.
-PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 
 
 def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str, Any]:
@@ -66,14 +64,23 @@ def chute_object(chute: Chute) -> dict[str, float | str]:
     return {short: getattr(chute, name) for short, name in PARAMETERS.items()}
 
 
-def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, float | str | None]:
+def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
     """One flow: every number of the registry by its symbol, and its kinds."""
     return {
         **_numbers(flow, NUMBERS, scales),
+        "name": flow.name,
         "interior": flow.interior,
         "density": flow.density,
         "error": finite(flow.error),
+        "validity": validity_object(flow),
     }
+
+
+def validity_object(flow: Flow) -> dict[str, Any]:
+    """How far a flow keeps to the theory: numbers without scales, and the words where a limit is passed."""
+    known = flow.validity
+    numbers = {name: finite(getattr(known, name)) for name in VALIDITY}
+    return {"nu_max": finite(known.largest_volume_fraction), **numbers, "words": list(known.words)}
 
 
 def factor(name: str, chute: Chute, scales: Scales | None) -> float:

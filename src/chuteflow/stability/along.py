@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.analysis.crossings import Chord
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.errors import InputError, SolveError
@@ -31,6 +32,9 @@ class Sample:
     flow: Flow
     found: Stability | None
 
+    def __repr__(self) -> str:
+        return display.line("Sample", self.label, repr(self.flow)[1:-1])
+
     @property
     def label(self) -> str:
         """ "stable", the direction of the mode that grows fastest, or "unknown"."""
@@ -48,6 +52,9 @@ class Run:
     label: str
     flows: tuple[Flow, ...]
 
+    def __repr__(self) -> str:
+        return display.line("Run", self.label, display.counted(len(self.flows), "flow"))
+
 
 @dataclass(frozen=True, eq=False)
 class MarkedBranch:
@@ -60,6 +67,10 @@ class MarkedBranch:
     samples: tuple[Sample, ...]
     runs: tuple[Run, ...]
 
+    def __repr__(self) -> str:
+        labels = ", ".join(run.label for run in self.runs)
+        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} judged: {labels}")
+
 
 @dataclass(frozen=True, eq=False)
 class MarkedCurve:
@@ -67,6 +78,10 @@ class MarkedCurve:
 
     curve: Curve
     branches: tuple[MarkedBranch, ...]
+
+    def __repr__(self) -> str:
+        judged = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
 
 
 def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:

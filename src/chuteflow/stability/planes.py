@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.along import flow_between
@@ -127,6 +128,10 @@ class WaveMap:
     frequency: Array
     neutral: tuple[NeutralCurve, ...]
 
+    def __repr__(self) -> str:
+        reach = (display.span("kx", self.kx), display.span("ky", self.ky), display.span("growth", self.growth.flat))
+        return display.line("WaveMap", *reach, display.counted(len(self.neutral), "neutral curve"))
+
 
 @dataclass(frozen=True, eq=False)
 class FamilyMap:
@@ -144,6 +149,11 @@ class FamilyMap:
     frequency: Array
     neutral: tuple[NeutralCurve, ...]
     neutral_flows: tuple[tuple[Flow, ...], ...]
+
+    def __repr__(self) -> str:
+        reach = (display.span("k h", self.depth_wavenumber), display.span("growth", self.growth.flat))
+        flows, curves = display.counted(len(self.flows), "flow"), display.counted(len(self.neutral), "neutral curve")
+        return display.line("FamilyMap", f"{flows}, waves at {self.angle:g} degrees", *reach, curves)
 
 
 def wave_map(

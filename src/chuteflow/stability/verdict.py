@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import refined
@@ -50,6 +51,18 @@ class Stability:
     mode: Mode | None
     searched: tuple[float, float]
     smallest_rate: float
+
+    def __repr__(self) -> str:
+        verdict = {True: "stable", False: "unstable"}.get(self.stable, "not known")
+        return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
+
+    def _repr_html_(self) -> str:
+        mode = self.mode
+        header = ["", "mode", "kx", "ky", "growth", "frequency", "error"]
+        numbers = [] if mode is None else [mode.kx, mode.ky, mode.growth, mode.frequency, mode.error]
+        cells = ["none"] if mode is None else [mode.kind, *map(display.number, numbers)]
+        verdict = repr(self)[1:-1].split(": ")[1].split("; ")[0]
+        return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
 
 
 def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None) -> Stability:

@@ -9,17 +9,24 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chuteflow import display
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+from chuteflow.steady.names import name_of
+from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution, in_parts
+from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
+from chuteflow.theory.laws import law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
 #: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
 _SAMPLES = 96
+#: The density is taken to rise or fall where p dtheta/dp differs by so much from 1.
+_LEVEL = 1e-8
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -44,6 +51,15 @@ class Profile:
     shear_rate: Array
     production: Array
     dissipation: Array
+
+    def __repr__(self) -> str:
+        heights = np.ravel(self.height)
+        return display.line("Profile", display.counted(heights.size, "height"), display.span("z", heights))
+
+    def _repr_html_(self) -> str:
+        columns = [np.ravel(getattr(self, name)) for name in FIELDS]
+        rows = [[display.number(value) for value in row] for row in zip(*columns, strict=True)]
+        return display.html_table("Fields over height", [FIELDS[name].symbol for name in FIELDS], rows)
 
 
 @dataclass(frozen=True)
@@ -79,6 +95,21 @@ class Flow:
 
     chute: Chute
     solution: Solution
+
+    def __repr__(self) -> str:
+        numbers = {NUMBERS[name].symbol: getattr(self, name) for name in PLACE}
+        return display.line("Flow", self.name, **numbers, error=self.error)
+
+    def _repr_html_(self) -> str:
+        rows = [(q.symbol, display.number(getattr(self, name)), q.description) for name, q in NUMBERS.items()]
+        rows.append(("error", display.number(self.error), "estimated relative error of Q, h and M, the largest"))
+        kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
+        return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
+
+    @property
+    def name(self) -> str:
+        """What it is called by its own numbers, such as "hot, dilute, deep", see :mod:`chuteflow.steady.names`."""
+        return name_of(self.surface_temperature, self.largest_volume_fraction, self.centre_of_mass)
 
     @property
     def mass_flux(self) -> float:
@@ -173,6 +204,31 @@ class Flow:
         """Smallest and largest dissipation less production over nu p sqrt(T) in the flow."""
         net = self._samples["net"]
         return float(net.min()), float(net.max())
+
+    @cached_property
+    def validity(self) -> Validity:
+        """How far the flow keeps to what the theory takes for granted."""
+        problem, state = self.solution.problem, self._state
+        chosen = law(self.chute.closure)
+        nu = _density(state.x, state.f)
+        # Rounding does not let grains be packed to the last.
+        room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
+        contacts = nu * chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope).radial
+        per_grain = problem.grid.weights / state.s_p / state.mass
+        largest = self.largest_volume_fraction
+        return Validity(
+            largest_volume_fraction=largest,
+            packing=largest / chosen.densest,
+            slip_ratio=float(self._model.slip(state.f[:, -1])),
+            knudsen_number=MEAN_FREE_PATH / float(per_grain @ contacts) / self.centre_of_mass,
+            density_turns=self._density_turns,
+        )
+
+    @property
+    def _density_turns(self) -> int:
+        rise = self._samples["rise"] - 1.0
+        signs = np.sign(rise[np.abs(rise) > _LEVEL])
+        return int(np.count_nonzero(np.diff(signs)))
 
     @cached_property
     def energy_budget(self) -> EnergyBudget:

@@ -87,7 +87,7 @@ NUMBERS: dict[str, Quantity] = {
         Quantity(
             "surface_temperature",
             "T_surface",
-            r"T_\infty",
+            r"T_{\mathrm{surface}}",
             (0, 1, 1),
             "m^2/s^2",
             "section 3.2",
@@ -138,6 +138,52 @@ NUMBERS: dict[str, Quantity] = {
             "m",
             "section 3.7",
             "height of the interface (infinite on the half-line)",
+        ),
+    )
+}
+
+#: The numbers that place a flow on a curve.
+PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+
+#: Numbers that tell how far a flow keeps to the theory, attributes of :class:`chuteflow.steady.validity.Validity`.
+VALIDITY: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        Quantity(
+            "packing",
+            "nu_max/nu*",
+            r"\nu_{\max}/\nu^*",
+            (0, 0, 0),
+            "1",
+            "section 2.1",
+            "largest volume fraction over that of the densest packing of the law",
+        ),
+        Quantity(
+            "slip_ratio",
+            "u_base/sqrt(T_base)",
+            r"u_0/\sqrt{T_0}",
+            (0, 0, 0),
+            "1",
+            "section 2.2",
+            "slip velocity over the velocity of fluctuations at the base",
+        ),
+        Quantity(
+            "knudsen_number",
+            "Kn",
+            r"\mathrm{Kn}",
+            (0, 0, 0),
+            "1",
+            "",
+            "mean free path over the height of the centre of mass",
+        ),
+        Quantity(
+            "density_turns",
+            "turns",
+            "n",
+            (0, 0, 0),
+            "1",
+            "",
+            "how often the volume fraction turns between rising and falling with height",
         ),
     )
 }

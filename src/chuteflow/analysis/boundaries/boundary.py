@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.analysis.boundaries import seeds
 from chuteflow.analysis.boundaries.points import BoundaryPoint
 from chuteflow.analysis.boundaries.system import Sweep
@@ -23,6 +24,7 @@ from chuteflow.numerics.continuation import Control
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import PARAMETERS
+from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 
 #: What can be followed.
@@ -43,6 +45,9 @@ class Turning:
     error: float
     position: int
 
+    def __repr__(self) -> str:
+        return display.line("Turning", self.kind, repr(self.flow.chute), Q=self.flow.mass_flux, error=self.error)
+
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
@@ -59,6 +64,18 @@ class Boundary:
     special: tuple[Turning, ...]
     ends: tuple[str, str]
     traced: TracedBoundary = field(repr=False)
+
+    def __repr__(self) -> str:
+        turns = display.counted(len(self.special), "turning point")
+        reach = (display.span(self.second, self.parameter), display.span("Q", self.mass_flux))
+        points = display.counted(len(self.flows), "point")
+        return display.line("Boundary", f"{self.kind} in {self.second}", f"{points}, {turns}", *reach)
+
+    def _repr_html_(self) -> str:
+        columns = [self.parameter, *(getattr(self, name) for name in PLACE), self.error]
+        rows = [[display.number(value) for value in row] for row in zip(*columns, strict=True)]
+        header = [self.second, *(NUMBERS[name].symbol for name in PLACE), "error"]
+        return display.html_table(repr(self)[1:-1], header, rows)
 
     def at(self, value: float, tolerance: float = TOLERANCE) -> list[Flow]:
         """The flows of the boundary whose second parameter has a ``value``, in order along it.
@@ -124,6 +141,22 @@ class BoundarySet(Sequence[Boundary]):
     searched: Searched
     tolerance: float
     reason: str | None
+
+    def __repr__(self) -> str:
+        count = display.counted(len(self), "boundary", "boundaries")
+        bounds = f"{self.second} from {display.number(self.bounds[0])} to {display.number(self.bounds[1])}"
+        return display.line("BoundarySet", f"{count} of {self.kind}", bounds, self.reason)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [
+                *(str(i), display.counted(len(one.flows), "point"), display.span(self.second, one.parameter)),
+                *(display.span("Q", one.mass_flux), ", ".join(turn.kind for turn in one.special), *one.ends),
+            ]
+            for i, one in enumerate(self, 1)
+        ]
+        header = ["", "points", self.second, "Q", "turning points", "begins at", "ends at"]
+        return display.html_table(repr(self)[1:-1], header, rows, self.reason)
 
     def __len__(self) -> int:
         return len(self.boundaries)

@@ -19,6 +19,7 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow import display
 from chuteflow.analysis.domains.columns import Classify, Column, between, column, shares_for, to_halve
 from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
 from chuteflow.analysis.domains.outlines import Boundary, Region, boundaries, regions
@@ -54,6 +55,20 @@ class Domain:
     tolerance: float
     columns: tuple[Column, ...]
     hot_columns: tuple[Column, ...]
+
+    def __repr__(self) -> str:
+        axes = [f"{axis.name} from {axis.low:g} to {axis.high:g}" for axis in (self.plane.x, self.plane.y)]
+        cells = f"{len(self.x)} x {len(self.y)} cells"
+        return display.line("Domain", cells, *axes, f"tolerance {self.tolerance:g} of the axes")
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, str(value), f"{float((values == value).mean()):.2%}"]
+            for name in ("hot", "most", "families", "interior", "density")
+            for values in (getattr(self, name),)
+            for value in np.unique(values)
+        ]
+        return display.html_table(repr(self)[1:-1], ["class", "value", "share of the cells"], rows)
 
     @classmethod
     def on_cells(
