@@ -26,7 +26,12 @@ def public_results():
         CHUTE, of="fold-Q", second="slope", bounds=(0.29, 0.3), samples=2, surface_temperature=(0.1, 10.0)
     )
     domain = chuteflow.domain(
-        CHUTE, x=("slope", 0.2, 0.3), y=("roughness", 0.55, 0.65), size=(4, 4), tolerance=0.1, surface_temperature=(1.0, 10.0)
+        CHUTE,
+        x=("slope", 0.2, 0.3),
+        y=("roughness", 0.55, 0.65),
+        size=(4, 4),
+        tolerance=0.1,
+        surface_temperature=(1.0, 10.0),
     )
     stability = chuteflow.stability_of(FLOWS[2], kx=0.01, ky=0.0)
     branch = CURVE.branches[0]

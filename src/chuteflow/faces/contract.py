@@ -112,7 +112,10 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
         for name in PLACE
     }
     special = [{"kind": point.kind, **_numbers(point.flow, PLACE, scales)} for point in branch.special]
-    return {**arrays, "special": special, "ends": list(branch.ends)}
+    known = [flow.validity for flow in branch.flows]
+    validity: dict[str, Any] = {name: [finite(getattr(one, name)) for one in known] for name in VALIDITY}
+    validity["words"] = [list(one.words) for one in known]
+    return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
 
 
 def searched_object(chute: Chute, searched: Searched, scales: Scales | None = None) -> dict[str, Any]:

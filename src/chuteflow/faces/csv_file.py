@@ -20,10 +20,11 @@ from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, Scales
+from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, VALIDITY, Scales
+from chuteflow.steady.validity import WORDS
 
 _HEAD, _ROW = "# restore: ", "# unknowns: "
-_KINDS = ("interior", "density", "error")
+_KINDS = ("interior", "density", "error", *VALIDITY, "validity", "name")
 
 
 def write(result: Result, path: Path, scales: Scales | None) -> None:
@@ -76,6 +77,9 @@ def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
         unit = "" if scales is None else f" [{quantity.unit}]"
         yield f"{name}: {quantity.symbol}{unit}, {quantity.description}, {quantity.equation}"
     yield "error: estimated relative error of mass_flux, centre_of_mass and mass_holdup, the largest"
+    for name, quantity in VALIDITY.items():
+        yield f"{name}: {quantity.symbol}, {quantity.description}"
+    yield "validity: " + "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items())
 
 
 def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Scales | None) -> None:
@@ -96,4 +100,6 @@ def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Sca
 def _numbers(flow: Flow, scales: Scales | None) -> list[Any]:
     """The numbers and kinds of a flow; what is not finite is an empty cell."""
     numbers = [finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in NUMBERS]
-    return [*numbers, flow.interior, flow.density, finite(flow.error)]
+    known = flow.validity
+    limits = [finite(getattr(known, name)) for name in VALIDITY]
+    return [*numbers, flow.interior, flow.density, finite(flow.error), *limits, known.summary, flow.name]

@@ -21,8 +21,9 @@ from chuteflow.faces import records
 from chuteflow.faces.contract import factor
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
-from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity, Scales
+from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity, Scales
 from chuteflow.steady.solver import Status
+from chuteflow.steady.validity import WORDS
 
 _INTERIORS = ("dissipative", "mixed", "productive")
 _DENSITIES = ("monotonic", "inverted")
@@ -38,6 +39,7 @@ def write(result: Result, path: Path, scales: Scales | None) -> None:
         file.attrs.update(_attributes(result, scales))
         _write_numbers(file, found, scales)
         _write_kinds(file, found)
+        _write_validity(file, found)
         if isinstance(result, Curve):
             _write_branches(file, found)
         _write_profiles(file, found, scales)
@@ -124,6 +126,23 @@ def _write_kinds(file: h5netcdf.File, found: Sequence[Row]) -> None:
         _write_flags(file, name, [getattr(flow, name) for flow in flows], meanings, long_name)
     status = [flow.solution.status.name.lower() for flow in flows]
     _write_flags(file, "status", status, [s.name.lower() for s in _STATUS], "how the solution ended")
+
+
+def _write_validity(file: h5netcdf.File, found: Sequence[Row]) -> None:
+    """Numbers that tell how far flows keep to the theory, and a bit for each limit that is passed."""
+    known = [row.flow.validity for row in found]
+    for name, quantity in VALIDITY.items():
+        values = np.array([getattr(one, name) for one in known], dtype="f8")
+        _write(file, name, ("flow",), values, {"units": "1", "long_name": quantity.description})
+    bits = {word: 1 << i for i, word in enumerate(WORDS)}
+    attributes = {
+        "long_name": "limits of the theory that are passed",
+        "flag_masks": np.array([*bits.values()], dtype="i1"),
+        "flag_meanings": " ".join(word.partition(":")[0].replace(" ", "_") for word in WORDS),
+        "comment": "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items()),
+    }
+    passed = np.array([sum(bits[word] for word in one.words) for one in known], dtype="i1")
+    _write(file, "validity", ("flow",), passed, attributes)
 
 
 def _write_branches(file: h5netcdf.File, found: Sequence[Row]) -> None:

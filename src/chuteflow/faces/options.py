@@ -30,7 +30,7 @@ _MATERIAL = {
 _CONDITIONS = {
     "flux": ("Q", "mass_flux"),
     "holdup": ("M", "mass_holdup"),
-    "depth": ("h", "centre_of_mass"),
+    "centre_of_mass": ("h", "centre_of_mass"),
     "temperature": ("T_surface", "surface_temperature"),
 }
 _SCALES = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
@@ -108,7 +108,7 @@ chute_options = _options(
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
     option("--holdup", metavar="AMOUNT", help="Mass hold-up M, mass per unit area of the base."),
-    option("--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
+    option("--centre-of-mass", "--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
     option("--temperature", metavar="AMOUNT", help="Granular temperature far above, or at the interface."),
 )
 search_range_options = _options(
@@ -185,14 +185,19 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
     """
     named = [name for name in _CONDITIONS if given[name] is not None]
     if not named:
-        raise InputError("missing one of --flux, --holdup, --depth and --temperature, for example --flux 3")
+        raise InputError("missing one of --flux, --holdup, --centre-of-mass and --temperature, for example --flux 3")
     if len(named) > 1:
-        both = " and ".join(f"--{name} {given[name]}" for name in named)
-        raise InputError(f"{both}: give one of --flux, --holdup, --depth and --temperature, and no other")
+        both = " and ".join(f"{_written(name)} {given[name]}" for name in named)
+        raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
     from chuteflow.faces.units import read_amount
 
     argument, quantity = _CONDITIONS[named[0]]
-    return {argument: read_amount(f"--{named[0]}", given[named[0]], quantity, scales, chute.slope)}
+    return {argument: read_amount(_written(named[0]), given[named[0]], quantity, scales, chute.slope)}
+
+
+def _written(name: str) -> str:
+    """A parameter of a command as it is typed."""
+    return f"--{name.replace('_', '-')}"
 
 
 def chosen(found: FlowSet, which: int | None) -> Flow:

@@ -326,13 +326,20 @@ class Flow:
         if k in (0, len(nu) - 1):
             return share[k : k + 1]
         low, high = share[k - 1], share[k + 1]
+        below, above = (float(self._samples["rise"][i] - 1.0) for i in (k - 1, k + 1))
+        middle = share[k]
+        # Secants within the bracket; an end that stays counts for half (the Illinois method).
         for _ in range(50):
-            middle = 0.5 * (low + high)
-            if self._at_share(np.array([middle]))[0]["rise"][0] < 1.0:
-                low = middle
+            value = float(self._at_share(np.array([middle]))[0]["rise"][0] - 1.0)
+            if value < 0.0:
+                low, below, above = middle, value, 0.5 * above
             else:
-                high = middle
-        return np.array([0.5 * (low + high)])
+                high, below, above = middle, 0.5 * below, value
+            # The density is flat there: half the digits of the place are all of its own.
+            if abs(value) < _LEVEL or not below < 0.0 < above:
+                break
+            middle = low - below * (high - low) / (above - below)
+        return np.array([middle])
 
     @cached_property
     def _antiderivatives(self) -> tuple[Array, Array]:

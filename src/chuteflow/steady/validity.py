@@ -25,7 +25,7 @@ MEAN_FREE_PATH = 1.0 / (6.0 * math.sqrt(2.0))
 WORDS = {
     "packed: beyond the theory": f"nu_max above {PACKED:g} of the densest packing, where contacts last",
     "dense: beyond the theory": f"nu_max above {CLUSTERED:g}, where grains form clusters and chains",
-    "large slip": f"u_base above {SLIP:g} sqrt(T_base); the condition at the base takes it to be small",
+    "large slip": "u_base above sqrt(T_base), where the condition at the base takes it to be small",
     "rarefied": f"mean free path above {RAREFIED:g} h: few collisions for a continuum",
     "layered": f"the density turns {TURNS} times or more with height",
 }

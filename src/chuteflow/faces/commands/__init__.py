@@ -2,7 +2,7 @@
 
 #: Names and short descriptions, so that the list of commands is printed without importing any.
 COMMANDS = {
-    "solve": "Every steady flow of a chute at a flux, hold-up, depth or temperature.",
+    "solve": "Every steady flow of a chute at a flux, hold-up, centre of mass or temperature.",
     "curve": "Every family of flows of a chute, with folds and other special points.",
     "boundary": "Folds, onsets of density inversion and changes of interior through a second parameter.",
     "domain": "Where flows exist, how many and of which kind, over two parameters.",

@@ -89,6 +89,7 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
         yield ""
         yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
         yield _points(branch, found, scales)
+        yield from words.validity(branch.flows, found.chute, scales)
         if judged is not None:
             yield _stretches(judged.branches[i - 1], found, scales)
     yield ""

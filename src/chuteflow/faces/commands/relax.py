@@ -193,7 +193,7 @@ def _plot(flow: Flow, moments: Sequence[Moment], end: Outcome, path: str) -> Non
         ax.plot([m.time for m in later], [getattr(m, name) for m in later], **style.stroke(0).line())
         for steady in end.steady:
             ax.axhline(getattr(steady, name), **rest.line(0.8))
-        ax.set_xscale("log")
+        style.logarithmic(ax, "x")
         style.name_axes(ax, "time, $t$", style.label(name))
     key = [
         Line2D([], [], label="disturbed flow", **style.stroke(0).line()),

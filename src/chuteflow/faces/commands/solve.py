@@ -1,4 +1,4 @@
-"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, depth or temperature."""
+"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, centre of mass or temperature."""
 
 from __future__ import annotations
 
@@ -75,18 +75,25 @@ def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
     if found.flows:
         columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
         header = [
-            ["", *cells, end] for cells, end in zip(tables.heading(columns, scales), ("error", "[1]"), strict=False)
+            ["", *cells, end, word]
+            for cells, end, word in zip(
+                tables.heading(columns, scales), ("error", "[1]"), ("validity", ""), strict=False
+            )
         ]
         rows = [
-            [str(i), *tables.numbers(flow, columns, found.chute, scales), f"{flow.error:.0e}"]
+            [
+                *(str(i), *tables.numbers(flow, columns, found.chute, scales)),
+                *(f"{flow.error:.0e}", flow.validity.summary),
+            ]
             for i, flow in enumerate(found, 1)
         ]
         yield ""
-        yield tables.table([*header, *rows])
+        yield tables.table([*header, *rows], words=(len(columns) + 2,))
         yield ""
         for i, flow in enumerate(found, 1):
             yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
         yield ""
+        yield from words.notes(found)
         largest = max(flow.error for flow in found)
         yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
     else:
