@@ -45,7 +45,7 @@ def test_the_flows_are_those_of_the_library(client):
         [flow.surface_temperature for flow in flows], rel=1e-6
     )
     assert given["says"] == (
-        "Three flows share the flux Q = 3: one hot, dilute, deep; one in between; "
+        "Three flows share the flux Q = 3: one hot, dilute, deep; one warm, moderately dense; "
         "one cold, dense, shallow, densest above its base."
     )
     assert given["flows"][0]["name"] == "hot, dilute, deep"

@@ -18,7 +18,7 @@ from chuteflow.steady.quantities import NUMBERS, PLACE
 
 @dataclass(frozen=True)
 class Searched:
-    """The range in which nothing was missed: surface temperatures (low, high) and largest hold-up."""
+    """The range searched: surface temperatures (low, high) and largest hold-up."""
 
     surface_temperature: tuple[float, float]
     largest_holdup: float
@@ -26,7 +26,7 @@ class Searched:
 
 @dataclass(frozen=True, eq=False)
 class FlowSet(Sequence[Flow]):
-    """Every flow that was asked for, from hot to cold (by surface temperature, then by hold-up).
+    """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
     ``reason`` is one sentence on why there is none, or None where there are flows.

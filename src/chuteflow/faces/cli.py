@@ -56,7 +56,7 @@ class Commands(click.Group):
 )
 @click.version_option(__version__, prog_name="chuteflow")
 def chuteflow() -> None:
-    """Every steady, fully developed flow of grains that an inclined chute can carry."""
+    """The steady, fully developed flows of grains that an inclined chute can carry."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -97,7 +97,7 @@ def _attributes(result: Result, scales: Scales | None) -> dict[str, Any]:
         attributes |= {
             "searched_surface_temperature": np.array(result.searched.surface_temperature),
             "searched_largest_holdup": result.searched.largest_holdup,
-            "searched_comment": "dimensionless range in which no flow was missed",
+            "searched_comment": "dimensionless range in which flows were searched for",
             "tolerance": result.tolerance,
             "tolerance_comment": "relative error allowed in Q, h and M",
             "reason": result.reason or "",
