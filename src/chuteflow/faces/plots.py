@@ -48,7 +48,7 @@ _MARKERS = {
     "stability-change": ("P", "change of stability"),
 }
 #: What lies beneath the stretches of a curve whose flows pass these limits of the theory.
-_HALOS = {"packed: beyond the theory": "#d9d9d9", "dense: beyond the theory": "#ececec", "layered": "#fbe3c0"}
+_HALOS = {"packed: beyond the theory": "#adadad", "dense: beyond the theory": "#d6d6d6", "layered": "#f6cf97"}
 _RESOLUTION = 300
 
 
