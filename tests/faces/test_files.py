@@ -12,7 +12,7 @@ import pytest
 from chuteflow import Chute, Curve, FlowSet, InputError, Scales, curve, flows, load, save
 from chuteflow.faces.contract import curve_object, flow_set_object
 from chuteflow.faces.records import rows
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 SUFFIXES = [".nc", ".csv", ".json"]
@@ -90,6 +90,24 @@ def test_netcdf_says_what_it_holds(tmp_path):
         flow = RESULTS["flows"][0]
         wanted = flow.profile(heights[0]).velocity * GRAINS.factor("velocity", 0.3)
         np.testing.assert_allclose(velocity[...][0], wanted, rtol=1e-10)
+
+
+def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
+    wanted = RESULTS["flows"]
+    save(wanted, tmp_path / "flows.nc")
+    with h5netcdf.File(tmp_path / "flows.nc") as file:
+        for name in VALIDITY:
+            assert file.variables[name][...].tolist() == [getattr(flow.validity, name) for flow in wanted]
+        bits = file.variables["validity"]
+        words = bits.attrs["flag_meanings"].split()
+        said = [[word for word, mask in zip(words, bits.attrs["flag_masks"]) if value & mask] for value in bits[...]]
+        assert said == [["large_slip", "rarefied"], ["large_slip", "rarefied"], ["large_slip"]]
+    save(wanted, tmp_path / "flows.csv")
+    lines = [line for line in (tmp_path / "flows.csv").read_text().splitlines() if not line.startswith("#")]
+    for row in csv.DictReader(lines):
+        flow = wanted[int(row["flow"])]
+        assert (row["name"], row["validity"]) == (flow.name, flow.validity.summary)
+        assert float(row["knudsen_number"]) == flow.validity.knudsen_number
 
 
 def test_csv_reads_as_a_table(tmp_path):

@@ -78,7 +78,7 @@ def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
         yield f"{name}: {quantity.symbol}{unit}, {quantity.description}, {quantity.equation}"
     yield "error: estimated relative error of mass_flux, centre_of_mass and mass_holdup, the largest"
     for name, quantity in VALIDITY.items():
-        yield f"{name}: {quantity.symbol}, {quantity.description}"
+        yield f"{name}: {quantity.description}"
     yield "validity: " + "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items())
 
 

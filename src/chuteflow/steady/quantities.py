@@ -151,7 +151,7 @@ VALIDITY: dict[str, Quantity] = {
     for q in (
         Quantity(
             "packing",
-            "nu_max/nu*",
+            "packing",
             r"\nu_{\max}/\nu^*",
             (0, 0, 0),
             "1",
@@ -160,7 +160,7 @@ VALIDITY: dict[str, Quantity] = {
         ),
         Quantity(
             "slip_ratio",
-            "u_base/sqrt(T_base)",
+            "slip_ratio",
             r"u_0/\sqrt{T_0}",
             (0, 0, 0),
             "1",
@@ -169,7 +169,7 @@ VALIDITY: dict[str, Quantity] = {
         ),
         Quantity(
             "knudsen_number",
-            "Kn",
+            "knudsen_number",
             r"\mathrm{Kn}",
             (0, 0, 0),
             "1",
@@ -178,7 +178,7 @@ VALIDITY: dict[str, Quantity] = {
         ),
         Quantity(
             "density_turns",
-            "turns",
+            "density_turns",
             "n",
             (0, 0, 0),
             "1",
