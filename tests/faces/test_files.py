@@ -99,8 +99,8 @@ def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
         for name in VALIDITY:
             assert file.variables[name][...].tolist() == [getattr(flow.validity, name) for flow in wanted]
         bits = file.variables["validity"]
-        words = bits.attrs["flag_meanings"].split()
-        said = [[word for word, mask in zip(words, bits.attrs["flag_masks"]) if value & mask] for value in bits[...]]
+        words = [*zip(bits.attrs["flag_meanings"].split(), bits.attrs["flag_masks"], strict=True)]
+        said = [[word for word, mask in words if value & mask] for value in bits[...]]
         assert said == [["large_slip", "rarefied"], ["large_slip", "rarefied"], ["large_slip"]]
     save(wanted, tmp_path / "flows.csv")
     lines = [line for line in (tmp_path / "flows.csv").read_text().splitlines() if not line.startswith("#")]
