@@ -15,6 +15,8 @@ from chuteflow.paper.branches import in_order, smooth
 from chuteflow.stability.planes import FamilyMap
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
+#: The curve of the paper's chute with the usual number of flows.
+CURVE = curve(PAPER)
 
 
 def lines_of(axes):
@@ -100,7 +102,7 @@ def test_lines_pass_through_all_flows_and_stay_on_the_curve():
 
 
 def test_folds_are_round_at_the_usual_number_of_flows():
-    figure = plot_curve(curve(PAPER))
+    figure = plot_curve(CURVE)
     figure.draw_without_rendering()
     for axes in figure.axes:
         for line in lines_of(axes):
@@ -179,10 +181,10 @@ def test_the_surface_temperature_has_one_symbol(surface):
 
 
 def test_what_is_beyond_the_theory_is_marked():
-    figure = plot_curve(curve(PAPER))
+    figure = plot_curve(CURVE)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[-2:] == ["packed: beyond the theory", "dense: beyond the theory"]
-    (branch,) = curve(PAPER).branches
+    (branch,) = CURVE.branches
     dense = [flow.mass_flux for flow in branch.flows if flow.largest_volume_fraction > 0.49]
     wide = [line for line in lines_of(figure.axes[0]) if line.get_linewidth() > 4.0]
     flux = np.concatenate([values(line.get_xdata()) for line in wide])
