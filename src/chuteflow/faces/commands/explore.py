@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from contextlib import suppress
 
 import click
@@ -21,6 +22,7 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
     """Serve until interrupted."""
     import uvicorn
 
+    from chuteflow.faces.explorer.connections import Connection, Server
     from chuteflow.faces.explorer.server import LOOPBACK, application, bound
 
     address = host or "127.0.0.1"
@@ -33,11 +35,16 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
         click.echo(f"chuteflow: anyone who reaches {address} can use this server", err=True)
         hosts = None if address in _ANY else (*LOOPBACK, address)
     click.echo(f"The explorer is at {page}   (Ctrl-C ends it)")
-    settings = uvicorn.Config(application(hosts), log_level="warning", lifespan="on", limit_concurrency=256)
+    served = application(hosts)
+    settings = uvicorn.Config(
+        served, http=Connection, ws="none", log_level="error", lifespan="on", timeout_graceful_shutdown=1
+    )
     if not no_browser:
         _open_when_served(page)
     with suppress(KeyboardInterrupt):  # the way to end it
-        uvicorn.Server(settings).run(sockets=[listener])
+        Server(settings, served.state.scheduler.close).run(sockets=[listener])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one must not interrupt the end
+    click.echo("The explorer has ended")
 
 
 def _open_when_served(page: str) -> None:

@@ -1,8 +1,11 @@
 // Questions to the server.
 
-/** The answer to a question; `signal` takes it back, which the server notices. */
+// How often a question is asked again that the server has no room for, and after how many milliseconds.
+const attempts = 10, pause = 300;
+
+/** The answer to a question, with its status if that is not 200; `signal` takes it back, which the server notices. */
 export async function ask(question, query, signal) {
-  for (;;) {
+  for (let attempt = 1; ; attempt++) {
     let answer, status;
     try {
       const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal });
@@ -12,8 +15,10 @@ export async function ask(question, query, signal) {
       if (signal?.aborted) throw trouble;
       return { error: "the server does not answer: is chuteflow explore still running?" };
     }
-    if (status !== 503) return answer;
-    await new Promise((wake) => { setTimeout(wake, 300); });
+    if (status === 200) return answer;
+    if (status !== 503 || attempt === attempts) return { ...answer, status };
+    await new Promise((wake) => { setTimeout(wake, pause); });
+    signal?.throwIfAborted();
   }
 }
 
