@@ -4,6 +4,8 @@ import re
 import subprocess
 import sys
 import threading
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -34,3 +36,10 @@ class Served:
 def served():
     """The context manager that serves the explorer."""
     return Served
+
+
+@pytest.fixture
+def compute(monkeypatch):
+    """A computation that does what a query says, which workers find too: they take the path of this process."""
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    return import_module("explorer_computations").compute

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from contextlib import suppress
 
 import click
 
@@ -41,9 +40,10 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
     )
     if not no_browser:
         _open_when_served(page)
-    with suppress(KeyboardInterrupt):  # the way to end it
-        Server(settings, served.state.scheduler.close).run(sockets=[listener])
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one must not interrupt the end
+    server = Server(settings, served.state.scheduler.close)
+    # Also before and after the server takes signals itself: interrupts interrupt neither its start nor its end.
+    signal.signal(signal.SIGINT, server.handle_exit)
+    server.run(sockets=[listener])
     click.echo("The explorer has ended")
 
 

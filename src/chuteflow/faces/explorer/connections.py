@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
 from collections import defaultdict
 from collections.abc import Iterable
+from types import FrameType
 from typing import Any
 
 import uvicorn
@@ -128,6 +130,13 @@ class Server(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, end: Any) -> None:
         super().__init__(config)
         self._end = end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """End, at once and once, however many signals there are. An interrupt is the way to end it, and no failure."""
+        if sig == signal.SIGINT:
+            self.should_exit = True
+        elif not self.should_exit:
+            super().handle_exit(sig, frame)
 
     async def on_tick(self, counter: int) -> bool:
         """Inspect the connections now and then."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
@@ -12,13 +13,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
+from importlib import import_module
+from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnProcess
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from chuteflow.faces.explorer.answers import Answer, answer
+# A process that starts imports this module first: what computes is imported later, by who watches over it.
+if TYPE_CHECKING:
+    from chuteflow.faces.explorer.answers import Answer
 
 #: Computes the answer to a question with its query; it runs in the worker, which finds it by its module and name.
-Compute = Callable[[str, Mapping[str, str]], Answer]
+Compute = Callable[[str, Mapping[str, str]], "Answer"]
 #: Questions with their queries that a worker answers once as it starts, so that what they need is loaded.
 Questions = Sequence[tuple[str, Mapping[str, str]]]
 
@@ -26,6 +31,7 @@ Questions = Sequence[tuple[str, Mapping[str, str]]]
 _LOOK, _AGAIN = 0.05, 0.25
 #: Seconds that a computation may take to end once it is interrupted, and a process to start.
 _GRACE, _START = 1.0, 60.0
+T = TypeVar("T")
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 # Processes are started from several threads; the environment that they inherit is changed meanwhile.
 _starting = threading.Lock()
@@ -74,10 +80,10 @@ class Worker:
     Args:
         nice: by how much the priority of the process is lower than that of this one, 0 to 19.
         warm: questions that it answers as it starts.
-        compute: what computes an answer.
+        compute: what computes an answer, a function of a module.
     """
 
-    def __init__(self, *, nice: int = 0, warm: Questions = (), compute: Compute = answer) -> None:
+    def __init__(self, *, nice: int = 0, warm: Questions = (), compute: Compute) -> None:
         self._nice = nice
         self._warm = warm
         self._compute = compute
@@ -150,7 +156,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         near, far = context.Pipe()
         control, heard = context.Pipe()
-        arguments = far, heard, self._nice, self._warm, self._compute
+        arguments = far, heard, self._nice, self._warm, self._compute.__module__, self._compute.__qualname__
         process = context.Process(target=_serve, args=arguments, daemon=True)
         with _starting, limited_children(), _without_interrupts():
             process.start()
@@ -195,6 +201,8 @@ def _without_interrupts() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    # Its own helper process would unblock the signal as it starts.
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -202,13 +210,21 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(pipe: Pipe, control: Pipe, nice: int, warm: Questions, compute: Compute) -> None:
+def _serve(pipe: Pipe, control: Pipe, nice: int, warm: Questions, module: str, name: str) -> None:
     """Answer until the other end closes."""
     watch = _Watch(control)
     if hasattr(os, "nice"):
         os.nice(nice)
-    for question, query in warm:
-        compute(question, query)
+
+    def loaded() -> Compute:
+        compute = getattr(import_module(module), name)
+        for question, query in warm:
+            compute(question, query)
+        return compute
+
+    compute = watch.bounded(0, Limits(math.inf, math.inf), loaded)
+    if isinstance(compute, Ended):
+        return
     try:
         pipe.send("ready")
         while True:
@@ -235,7 +251,7 @@ class _Watch:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         threading.Thread(target=self._run, daemon=True).start()
 
-    def bounded(self, number: int, limits: Limits, compute: Callable[[], Answer]) -> Answer | Ended:
+    def bounded(self, number: int, limits: Limits, compute: Callable[[], T]) -> T | Ended:
         """What ``compute`` returns, or why it was interrupted."""
         self._limits, self._began = limits, (time.process_time(), time.monotonic())
         try:

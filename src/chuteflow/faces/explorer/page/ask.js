@@ -2,6 +2,8 @@
 
 // How often a question is asked again that the server has no room for, and after how many milliseconds.
 const attempts = 10, pause = 300;
+// Milliseconds after which it is said that an answer takes long.
+const patience = 400;
 
 /** The answer to a question, with its status if that is not 200; `signal` takes it back, which the server notices. */
 export async function ask(question, query, signal) {
@@ -24,8 +26,10 @@ export async function ask(question, query, signal) {
 
 /** One question of a kind is under way at a time; of those that come meanwhile, only the last is asked. */
 export class Latest {
-  constructor(question, answered) {
+  /** `waits` (whether) is told when an answer takes long, and when it is there; `answered` takes the answer. */
+  constructor(question, waits, answered) {
     this.question = question;
+    this.waits = waits;
     this.answered = answered;
     this.busy = false;
     this.next = null;
@@ -41,7 +45,10 @@ export class Latest {
     while (this.next) {
       const { query, mark } = this.next;
       this.next = null;
-      this.answered(await ask(this.question, query), query, mark);
+      const late = setTimeout(() => this.waits(true), patience), answer = await ask(this.question, query);
+      clearTimeout(late);
+      this.waits(false);
+      this.answered(answer, query, mark);
     }
     this.busy = false;
   }

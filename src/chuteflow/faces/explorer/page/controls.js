@@ -71,7 +71,7 @@ function makeSlider(name, control) {
   byId(`${name}-slider`).addEventListener("input", (event) =>
     set({ [name]: Number(valueAt(control, Number(event.target.value)).toPrecision(4)) }, event));
   takeTyped(name, control.label.toLowerCase(), (typed) => ({ [name]: typed / factorOf(name) }), "a number");
-  if (name === "slope") takeTyped("angle", "angle", (typed) => ({ slope: Math.tan((typed * Math.PI) / 180) }), "a number");
+  if (name === "slope") takeTyped("angle", "angle", (typed) => (typed > 0 && typed < 90 ? { slope: Math.tan((typed * Math.PI) / 180) } : null), "above 0 and below 90 degrees");
 }
 
 function makeChoice(name, { label, options, meaning }) {

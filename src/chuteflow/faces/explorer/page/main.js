@@ -27,15 +27,18 @@ function set(parts, event) {
 
 // --- answers ----------------------------------------------------------------------------------------------------
 
+/** Whether a panel waits for an answer, said after a while. */
+const waits = (panel) => (waiting) => byId(panel).setAttribute("aria-busy", String(waiting));
+
 const asks = {
-  flows: new Latest("flows", (answer, query, since) => take(answer, "flows", since, () => {
+  flows: new Latest("flows", waits("words"), (answer, query, since) => take(answer, "flows", since, () => {
     flows = answer.error ? { ...answer, top: 1, says: sentence(answer.error) } : answer;
     const held = curve.heldFlow(flows.flows);
     if (held !== null) change({ flow: held });
     stability.restart(flows.flows.length);
     showFlows();
   })),
-  curve: new Latest("curve", (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
+  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
 };
 
 const refused = {};
@@ -45,7 +48,7 @@ function take(answer, name, since, use) {
   // What is left out is said in its panel, which shows then nothing that is of before.
   const leftOut = answer.status === 422;
   refused[name] = Boolean(answer.error) && !leftOut;
-  tell(name, refused[name] ? `${sentence(answer.error)}${flows ? " What is shown below is of before." : ""}` : "");
+  tell(name, refused[name] ? `${answer.error.replace(/\.$/, "")}.${flows ? " What is shown below is of before." : ""}` : "");
   document.querySelector("main").classList.toggle("of-before", Object.values(refused).includes(true));
   if (refused[name]) return;
   use();

@@ -7,7 +7,8 @@ export const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.c
 /** A sentence of what the server says: it begins large and ends with a full stop. */
 export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`;
 
-const told = {};
+// What the server says comes before what is said of typed text, which then has changed nothing.
+const told = { flows: "", curve: "", typed: "" };
 
 /** Say on the one line for it what is wrong, by where that comes from, or with an empty text that it no longer is. */
 export function tell(from, text) {
