@@ -22,7 +22,7 @@ from starlette.testclient import TestClient
 import chuteflow
 from chuteflow.errors import InputError
 from chuteflow.faces.cli import main
-from chuteflow.faces.explorer import answers, growth, queries, sentences
+from chuteflow.faces.explorer import answers, domains, growth, queries, sentences
 from chuteflow.faces.explorer.server import PAGE, application, bound, host_of
 from chuteflow.stability.modes import Disturbances
 from chuteflow.steady.chute import SURFACES
@@ -183,16 +183,29 @@ def test_a_bad_map_is_refused(client, change, said):
     assert said in given.json()["error"]
 
 
-def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(client):
-    # Four flows share a flux on a part of this column that is narrower than what is looked at otherwise.
-    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": str((0.3625 - 0.05) / 0.65)}
-    beside = client.get("/ask/map", params=query).json()["parts"]["most"]
-    near = ",".join(f"{stop:.4g}" for stop in beside["stops"])
-    again = client.get("/ask/map", params=query | {"near": near}).json()["parts"]["most"]
-    assert set(beside["values"]) <= set(again["values"])
-    refused = client.get("/ask/map", params=query | {"near": 40 * "0.6,"})
-    assert (refused.status_code, refused.json()["error"]) == (400, "near has 40 values: give at most 32")
-    assert client.get("/ask/map", params=query | {"near": "x"}).status_code == 400
+def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeypatch):
+    # A band between two of the points that are looked at anyway.
+    band = 0.3, 0.32
+
+    def summary(plane, outer, inner):
+        return (0, int(band[0] < inner < band[1]), 0, 0, 0)
+
+    monkeypatch.setattr(domains, "summary", summary)
+    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4"}
+    low, high = queries.CONTROLS["roughness"].low, queries.CONTROLS["roughness"].high
+    near = ",".join(f"{low + share * (high - low):.4g}" for share in band)
+    known = [domains.map_column(queries.map_column(query | more)).parts["most"] for more in ({}, {"near": near})]
+    assert [part.values for part in known] == [(0,), (0, 1, 0)]
+    assert known[1].stops == pytest.approx([low + share * (high - low) for share in band], abs=0.01 * (high - low))
+
+
+@pytest.mark.parametrize(
+    ("near", "said"), [(40 * "0.6,", "near has 40 values: give at most 32"), ("x", "near = 'x': must be a number")]
+)
+def test_what_a_column_is_near_is_checked(client, near, said):
+    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4", "near": near}
+    given = client.get("/ask/map", params=query)
+    assert (given.status_code, given.json()["error"]) == (400, said)
 
 
 def test_what_is_left_out_comes_with_how_to_compute_it_elsewhere():

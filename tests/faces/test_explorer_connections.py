@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 
 import psutil
 import pytest
@@ -19,8 +19,6 @@ import uvicorn
 from chuteflow.faces.explorer import connections
 from chuteflow.faces.explorer.connections import Connection, Server
 from chuteflow.faces.explorer.server import application, bound
-
-HALF = b"GET /about HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Long: "
 
 
 @contextmanager
@@ -40,18 +38,6 @@ def serving(compute):
         server.should_exit = True
         thread.join(20)
         assert not thread.is_alive()
-
-
-@contextmanager
-def half_sent(port, count, source="127.0.0.1"):
-    """Connections on which a request was begun and is not finished."""
-    with ExitStack() as opened:
-        those = []
-        for _ in range(count):
-            one = opened.enter_context(socket.create_connection(("127.0.0.1", port), 10, source_address=(source, 0)))
-            one.sendall(HALF)
-            those.append(one)
-        yield those
 
 
 def status(port, path="/about", source="127.0.0.1"):
@@ -82,7 +68,7 @@ def last_words(one):
     return int(head.split()[1]), json.loads(body)["error"]
 
 
-def test_four_hundred_half_sent_requests_shut_out_nobody(compute):
+def test_four_hundred_half_sent_requests_shut_out_nobody(compute, half_sent):
     with serving(compute) as port, half_sent(port, 400) as those:
         assert {status(port, source=source) for source in ("127.0.0.1", "127.0.0.2") for _ in range(20)} == {200}
         # Those that came first are told why they are dropped.
@@ -93,7 +79,7 @@ def test_four_hundred_half_sent_requests_shut_out_nobody(compute):
         assert those[-1].recv(12) == b"HTTP/1.1 200"
 
 
-def test_who_floods_is_dropped_and_no_other(compute):
+def test_who_floods_is_dropped_and_no_other(compute, half_sent):
     with serving(compute) as port, half_sent(port, 20, "127.0.0.2") as others, half_sent(port, 100):
         time.sleep(2.5)
         for one in others:
@@ -101,7 +87,7 @@ def test_who_floods_is_dropped_and_no_other(compute):
             assert one.recv(12) == b"HTTP/1.1 200"
 
 
-def test_where_there_is_no_room_the_client_with_the_most_connections_gives_it(compute, monkeypatch):
+def test_where_there_is_no_room_the_client_with_the_most_connections_gives_it(compute, monkeypatch, half_sent):
     monkeypatch.setattr(connections, "most", lambda: 50)
     with serving(compute) as port, half_sent(port, 48), half_sent(port, 10, "127.0.0.2") as others:
         assert status(port, source="127.0.0.2") == 200
@@ -110,7 +96,7 @@ def test_where_there_is_no_room_the_client_with_the_most_connections_gives_it(co
             assert one.recv(12) == b"HTTP/1.1 200"
 
 
-def test_a_request_has_so_much_time_and_no_more(compute, monkeypatch):
+def test_a_request_has_so_much_time_and_no_more(compute, monkeypatch, half_sent):
     monkeypatch.setattr(connections, "_REQUEST", 0.5)
     with serving(compute) as port, half_sent(port, 2) as (silent, slow):
         began = time.monotonic()
@@ -199,7 +185,7 @@ def test_workers_end_with_the_server(name):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("interrupts", [1, 3])
-def test_ctrl_c_ends_it_with_one_line_whatever_is_in_work(interrupts):
+def test_ctrl_c_ends_it_with_one_line_whatever_is_in_work(interrupts, half_sent):
     with explored() as (process, port), half_sent(port, 5), socket.create_connection(("127.0.0.1", port), 10) as asks:
         asks.sendall(
             b"GET /ask/stability?slope=0.3&e=0.8&ew=0.8&roughness=0.6&Q=3&flow=0 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
