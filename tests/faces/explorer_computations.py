@@ -12,7 +12,7 @@ from chuteflow.faces.explorer.answers import Answer
 if "WITHOUT_POSIX" in os.environ:  # as on other systems
     for module, name in ((os, "nice"), (os, "fork"), (signal, "pthread_kill"), (signal, "pthread_sigmask")):
         delattr(module, name)
-    sys.modules["fcntl"] = None
+    sys.modules["fcntl"] = None  # pyright: ignore[reportArgumentType]
 
 
 def compute(question, query):

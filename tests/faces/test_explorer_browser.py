@@ -5,7 +5,7 @@ import shutil
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 from xml.etree import ElementTree
 
 import pytest
@@ -210,6 +210,11 @@ def test_any_value_can_be_typed_and_taken_back(page, names):
     forget_refusals(page)
 
 
+def place_of(route):
+    """The place of the column of the map that is asked for."""
+    return float(parse_qs(urlsplit(route.request.url).query)["place"][0])
+
+
 def forget_refusals(page):
     """The browser reports what the server refused; nothing else may be among its errors."""
     page.troubles[:] = [said for said in page.troubles if "the server responded with a status of 4" not in said]
@@ -236,11 +241,11 @@ def test_any_address_is_drawn_or_refused(page, query):
 
 def test_a_message_goes_with_what_it_was_about(page):
     def column(route):
-        if "&e=2&" in route.request.url:
+        if parse_qs(urlsplit(route.request.url).query)["e"] == ["2"]:
             route.continue_()
             return
         parts = {name: {"stops": [], "values": [1]} for name in ("most", "families", "interior", "density", "hot")}
-        at = 0.05 + 0.65 * float(re.search(r"place=([\d.]+)", route.request.url)[1])
+        at = 0.05 + 0.65 * place_of(route)
         route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
 
     page.unroute("**/ask/map?*")
@@ -319,15 +324,15 @@ def test_flows_beyond_the_theory_are_marked(page):
 
 def test_the_surface_temperature_is_called_what_it_is(page):
     opened(page, "?against=T_surface")
-    expect(page.locator("#curve")).to_contain_text("temperature far above, Tsurface")
+    expect(page.locator("#curve")).to_contain_text("Tsurface, far above")
     expect(page.locator("#flows .numbers").nth(0)).to_contain_text("Tsurface 7.339")
     page.locator("#surface").select_option("interface")
-    expect(page.locator("#curve")).to_contain_text("temperature at the interface, Tsurface")
+    expect(page.locator("#curve")).to_contain_text("Tsurface, at the interface")
 
 
 def test_what_is_not_known_of_the_map_is_hatched(page):
     def column(route):
-        place = float(re.search(r"place=([\d.]+)", route.request.url)[1])
+        place = place_of(route)
         at = 0.05 + 0.65 * place
         if 0.4 < place < 0.6:
             route.fulfill(status=422, json={"error": "this column of the map is left out"})
@@ -352,7 +357,7 @@ def test_what_is_not_known_of_the_map_is_hatched(page):
 def test_regions_of_the_map_end_in_points_and_slanted_lines(page):
     # A boundary that is steep: each column has it somewhere else, those beside it not at all.
     def column(route):
-        place = float(re.search(r"place=([\d.]+)", route.request.url)[1])
+        place = place_of(route)
         share = 0.5 + (place - 0.5) / 0.1
         low, high = 0.5, 3**0.5 / 2
         inside = 0.0 < share < 1.0

@@ -205,8 +205,7 @@ def test_a_worker_ends_computations_by_the_processor_and_by_the_clock(worker):
 
 
 def test_a_computation_that_cannot_be_interrupted_costs_the_process(worker):
-    assert worker.put(object(), "map", does("nap", seconds=0), Limits(1.0, 10.0)).status == 200
-    process = worker.pid
+    process = said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"]
     assert worker.put(object(), "map", does("hold on"), Limits(0.1, 0.2)) is Ended.TOO_LONG
     assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] != process
 
@@ -216,7 +215,7 @@ def test_workers_do_without_what_other_systems_lack(compute, monkeypatch):
     worker = Worker(nice=5, compute=compute)
     try:
         assert worker.put(object(), "map", does("loop"), Limits(0.1, 60.0)) is Ended.TOO_LONG
-        assert worker.put(object(), "map", does("nap", seconds=0), Limits(1.0, 10.0)).status == 200
+        assert said(worker.put(object(), "map", does("nap", seconds=0), Limits(1.0, 10.0))) == "done"
     finally:
         worker.close()
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)

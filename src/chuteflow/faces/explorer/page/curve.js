@@ -9,7 +9,7 @@ const svg = byId("curve");
 /** What the curve is drawn against; the surface temperature is one thing on the half-line and another beneath an interface. */
 const nameOf = (quantity) => ({
   h: "centre of mass h", M: "hold-up M",
-  T_surface: state.surface === "interface" ? "temperature at the interface, T_surface" : "temperature far above, T_surface",
+  T_surface: state.surface === "interface" ? "T_surface, at the interface" : "T_surface, far above",
 })[quantity];
 const shapes = { "fold-Q": "circle", "fold-M": "circle", "fold-T": "circle", "density-inversion": "diamond", "interior-change": "triangle" };
 let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null;

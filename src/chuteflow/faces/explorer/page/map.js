@@ -174,11 +174,25 @@ function* halves(found, part, low, high) {
 function pieces(found, x) {
   const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
   const at = (o, i) => (outer === x ? [o, i] : [i, o]);
-  for (const [from, to, start, end, values] of halves(found, shaded, low, high)) values.forEach((value, k) => {
-    if (!areas.has(value)) areas.set(value, []);
-    const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
-    areas.get(value).push([at(from, p[0]), at(to, q[0]), at(to, q[1]), at(from, p[1])]);
-  });
+  let open = [];
+  for (const [from, to, start, end, values] of halves(found, shaded, low, high)) {
+    const before = open;
+    open = [];
+    values.forEach((value, k) => {
+      const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
+      if (p[0] === p[1] && q[0] === q[1]) return;
+      // What goes on from one half to the next is one area, without a seam.
+      let area = before.find((one) => one.value === value && one.ends[0] === p[0] && one.ends[1] === p[1]);
+      if (!area) {
+        area = { value, down: [at(from, p[0])], up: [at(from, p[1])] };
+        areas.set(value, [...(areas.get(value) ?? []), area]);
+      }
+      area.down.push(at(to, q[0]));
+      area.up.push(at(to, q[1]));
+      open.push(Object.assign(area, { ends: q }));
+    });
+  }
+  for (const [value, those] of areas) areas.set(value, those.map(({ down, up }) => [...down, ...up.reverse()]));
   for (const [from, to, start, end] of halves(found, ({ parts }) => parts?.hot ?? { stops: [], values: [unknown] }, low, high)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
   return { areas, lines };
 }
@@ -212,7 +226,7 @@ export function redraw() {
   svg.classList.toggle("waiting", !current || !whole);
   svg.insertAdjacentHTML("beforeend", `<path id="map-hair" class="hair"/><circle id="map-here" class="special" r="4.5"><title>this chute</title></circle>`);
   const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
-  key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}. Line: on one side of it there are flows at every high temperature. Drag the cross-hair to another chute.` : "";
+  key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
   key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
   svg.classList.toggle("failed", Boolean(failure));
