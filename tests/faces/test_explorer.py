@@ -286,6 +286,14 @@ def test_a_bad_query_gets_one_clear_line(client, query, said):
     assert "\n" not in given.json()["error"]
 
 
+def test_a_status_is_told_in_the_answer_where_that_is_wanted(client):
+    given = client.get("/ask/flows", params=PAPER | {"Q": "0"}, headers={"x-status": "in-answer"})
+    assert (given.status_code, given.json()) == (
+        200,
+        {"error": "Q = 0: must be from 0.001 to 100000", "status": 400},
+    )
+
+
 def test_a_parameter_given_twice_is_refused(client):
     given = client.get("/ask/flows?slope=0.3&slope=0.4")
     assert (given.status_code, given.json()) == (400, {"error": "'slope' is given several times: give it once"})

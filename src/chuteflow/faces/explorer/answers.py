@@ -162,6 +162,8 @@ def _curve(query: Query) -> Answer:
     content = contract.curve_object(found)
     for branch, entry in zip(found.branches, content["branches"], strict=True):
         entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
+        if "validity" in entry:
+            entry["validity"] = {"words": entry["validity"]["words"]}
     return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
 
 

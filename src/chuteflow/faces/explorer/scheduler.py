@@ -50,15 +50,15 @@ def lanes() -> dict[str, Lane]:
     quick = max(2, min(4, cores))
     return {
         "quick": Lane(quick, 0, early=True),
-        "slow": Lane(2, 15, early=True),
-        "drawing": Lane(2, 10),
-        "stability": Lane(2, 15),
+        "slow": Lane(2, 10, early=True),
+        "drawing": Lane(2, 8),
+        "stability": Lane(2, 12),
     }
 
 
 #: Where each question is computed first, and where again if that was too short.
 STAGES: Mapping[str, tuple[Stage, ...]] = {
-    "flows": (Stage("quick", 0.2), Stage("slow", 1.7)),
+    "flows": (Stage("quick", 0.3), Stage("slow", 1.6)),
     "curve": (Stage("quick", 0.3), Stage("slow", 1.6)),
     "map": (Stage("drawing", 2.0),),
     "export": (Stage("drawing", 20.0),),

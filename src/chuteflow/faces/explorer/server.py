@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
@@ -101,7 +102,8 @@ def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answe
             if repeated is not None:
                 return _error(400, f"{repeated[:40]!r} is given several times: give it once")
             client = (request.client.host, request.client.port) if request.client else ("", 0)
-            return _response(await scheduler.ask(question, request.query_params, client, request.is_disconnected))
+            given = await scheduler.ask(question, request.query_params, client, request.is_disconnected)
+            return _response(given, told=request.headers.get("x-status") == "in-answer")
 
         return respond
 
@@ -170,7 +172,13 @@ async def _about(_: Request) -> Response:
     )
 
 
-def _response(given: Answer) -> Response:
+def _response(given: Answer, told: bool) -> Response:
+    """The answer with its status; one that is no success is ``told`` in the answer itself, if that is wanted.
+
+    Browsers report every other status as an error of the page, which a refusal is not.
+    """
+    if told and given.status >= 400:
+        return JSONResponse(json.loads(given.body) | {"status": given.status})
     headers = {} if given.name is None else {"content-disposition": f'attachment; filename="{given.name}"'}
     if given.status == 503:
         headers["retry-after"] = "1"

@@ -10,9 +10,9 @@ export async function ask(question, query, signal) {
   for (let attempt = 1; ; attempt++) {
     let answer, status;
     try {
-      const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal });
-      status = response.status;
+      const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal, headers: { "x-status": "in-answer" } });
       answer = await response.json();
+      status = answer.status ?? response.status;
     } catch (trouble) {
       if (signal?.aborted) throw trouble;
       return { error: "the server does not answer: is chuteflow explore still running?" };

@@ -11,9 +11,12 @@ const dashes = ["", "7 4", "2 3"];
 export function drawProfiles(list, top, chosen) {
   const sz = factor("z");
   for (const [symbol, words, letter] of panels) {
-    const svg = byId(`profile-${symbol}`), s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
+    const svg = byId(`profile-${symbol}`);
+    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows`);
+    if (!list.length) { svg.innerHTML = ""; continue; }
+    const s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
     const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
-    const largest = list.length ? Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s : 1;
+    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s;
     draw(svg, {
       x: { low: 0, high: largest * 1.05, label },
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
@@ -23,7 +26,6 @@ export function drawProfiles(list, top, chosen) {
         return [...band, { points, colour: flowColour(i), width: i === chosen ? 3.4 : 2 }];
       }),
     });
-    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows`);
   }
 }
 
