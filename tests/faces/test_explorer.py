@@ -216,6 +216,18 @@ def test_what_is_left_out_comes_with_how_to_compute_it_elsewhere():
     assert content["flows"] == []
 
 
+def test_a_computation_that_fails_is_an_answer_too(monkeypatch):
+    def fails(query):
+        return np.linalg.inv(np.zeros((2, 2)))
+
+    monkeypatch.setitem(answers.QUESTIONS, "curve", fails)
+    given = answers.answer("curve", PAPER)
+    assert given.status == 422
+    assert json.loads(given.body)["error"] == (
+        "the curve of all flows is left out: the computation failed (LinAlgError: Singular matrix)"
+    )
+
+
 def test_an_unstable_flow_and_its_fastest_wave(client):
     given = client.get("/ask/stability", params=PAPER | {"Q": "3", "flow": "1"}).json()
     assert given["state"] == "unstable"

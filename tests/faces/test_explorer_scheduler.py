@@ -17,7 +17,7 @@ ONE, OTHER = ("127.0.0.1", 1), ("127.0.0.2", 2)
 @pytest.fixture
 def stages(monkeypatch):
     """Limits that are short."""
-    short = {"curve": (Stage("quick", 0.1), Stage("slow", 0.3)), "map": (Stage("drawing", 0.3),)}
+    short = {"curve": (Stage("quick", Limits(0.1, 20.0)), Stage("slow", Limits(0.3, 20.0)))}
     monkeypatch.setattr(scheduling, "STAGES", {**scheduling.STAGES, **short})
 
 
@@ -50,11 +50,9 @@ def test_a_question_that_takes_too_long_is_refused_and_that_is_remembered(played
     query = does("loop", log=tmp_path / "log", name="a")
 
     async def play(scheduler):
-        began = time.process_time()
-        answers = [await scheduler.ask("curve", query, ONE) for _ in range(3)]
-        return answers, time.process_time() - began
+        return [await scheduler.ask("curve", query, ONE) for _ in range(3)]
 
-    answers, _ = played(play)
+    answers = played(play)
     assert {answer.status for answer in answers} == {422}
     assert said(answers[0])["error"] == (
         "the curve of all flows is left out: not done within 0.4 seconds of computing; "
@@ -239,7 +237,7 @@ def test_there_are_as_many_quick_workers_as_the_process_may_use_processors(monke
 
 def test_limits_by_the_clock_leave_time_for_what_else_the_machine_does():
     for stages in scheduling.STAGES.values():
-        assert all(stage.limits.clock >= 4.0 * stage.limits.processor for stage in stages)
+        assert all(stage.limits.clock >= 5.0 * stage.limits.processor for stage in stages)
     # Flows and curves: an answer, or a refusal, for two seconds of computing.
     for question in ("flows", "curve"):
-        assert sum(stage.processor for stage in scheduling.STAGES[question]) <= 2.0
+        assert sum(stage.limits.processor for stage in scheduling.STAGES[question]) <= 2.0

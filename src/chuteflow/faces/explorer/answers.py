@@ -39,6 +39,8 @@ _FIELDS = {
     "dissipation": "dissipation",
 }
 _DIGITS = 7
+#: What else a computation may end with, which is no reason to end the process.
+_FAILURES = (ArithmeticError, ValueError, LookupError)
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ def answer(question: str, query: Query) -> Answer:
         return problem(400, str(error))
     except ChuteflowError as error:
         return left_out(question, query, str(error))
+    except _FAILURES as error:
+        return left_out(question, query, f"the computation failed ({type(error).__name__}: {error})")
 
 
 def problem(status: int, what: str) -> Answer:

@@ -18,7 +18,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 #: Seconds within which a request has to be there as a whole, and within which its answer has to be taken.
-_REQUEST, _ANSWER = 10.0, 180.0
+_REQUEST, _ANSWER = 10.0, 300.0
 #: Connections of one client that may wait for a request, once each has had so many seconds for it.
 _WAITING, _AT_FIRST = 32, 1.0
 #: Connections in all, as far as the system allows so many files, some of which are for other purposes.

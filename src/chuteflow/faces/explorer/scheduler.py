@@ -9,6 +9,8 @@ from collections import Counter, OrderedDict, deque
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
+from typing import ParamSpec, TypeVar
 
 from chuteflow.faces.explorer import queries
 from chuteflow.faces.explorer.answers import Answer, answer, left_out, problem
@@ -19,6 +21,8 @@ Gone = Callable[[], Awaitable[bool]]
 #: Who asks: an address and a port of it, so that one address may be several clients.
 Client = tuple[str, int]
 _Key = tuple[str, frozenset[tuple[str, str]]]
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -33,15 +37,10 @@ class Lane:
 
 @dataclass(frozen=True)
 class Stage:
-    """Where a question is computed, and for how many seconds of the processor at most."""
+    """Where a question is computed, and within which limits; by the clock there is time for what else runs."""
 
     lane: str
-    processor: float
-
-    @property
-    def limits(self) -> Limits:
-        """The limits of an answer: by the clock there is time for what else the machine does."""
-        return Limits(self.processor, 5.0 * self.processor)
+    limits: Limits
 
 
 def lanes() -> dict[str, Lane]:
@@ -58,11 +57,11 @@ def lanes() -> dict[str, Lane]:
 
 #: Where each question is computed first, and where again if that was too short.
 STAGES: Mapping[str, tuple[Stage, ...]] = {
-    "flows": (Stage("quick", 0.3), Stage("slow", 1.6)),
-    "curve": (Stage("quick", 0.3), Stage("slow", 1.6)),
-    "map": (Stage("drawing", 2.0),),
-    "export": (Stage("drawing", 20.0),),
-    "stability": (Stage("stability", 20.0),),
+    "flows": (Stage("quick", Limits(0.3, 1.5)), Stage("slow", Limits(1.6, 16.0))),
+    "curve": (Stage("quick", Limits(0.3, 1.5)), Stage("slow", Limits(1.6, 16.0))),
+    "map": (Stage("drawing", Limits(2.0, 20.0)),),
+    "export": (Stage("drawing", Limits(20.0, 100.0)),),
+    "stability": (Stage("stability", Limits(20.0, 100.0)),),
 }
 #: Answers that are remembered, questions of one address that are in work or wait, and clients whose turn is known.
 _REMEMBERED, _OF_ONE_ADDRESS, _KNOWN = 512, 256, 4096
@@ -102,6 +101,8 @@ class _Crew:
         # The one used last is used next, so that others start only where it does not suffice.
         self.free: list[Worker] = []
         self.cold = deque(self.workers)
+        # One at a time starts, so that the first is ready as soon as can be.
+        self.starting = False
         self.waiting: list[_Job] = []
         self.early = lane.early
 
@@ -133,8 +134,7 @@ class Scheduler:
     def start(self) -> None:
         """Start the processes that are to run early, and ask them what the page asks as it opens."""
         for crew in self._crews.values():
-            while crew.early and crew.cold:
-                self._spawn(self._ready(crew, crew.cold.popleft()))
+            self._start_next(crew)
         for question, query in _first_questions():
             self._spawn(self._asked_ahead(question, query))
 
@@ -225,29 +225,39 @@ class Scheduler:
             while len(self._turns) > _KNOWN:
                 self._turns.popitem(last=False)
             self._spawn(self._work(crew, crew.free.pop(), job))
-        if crew.waiting and crew.cold and not self._closed:
-            self._spawn(self._ready(crew, crew.cold.popleft()))
+        self._start_next(crew)
+
+    def _start_next(self, crew: _Crew) -> None:
+        """Start one more worker where some wait, or where all are to run from the start."""
+        if crew.cold and (crew.waiting or crew.early) and not (crew.starting or self._closed):
+            crew.starting = True
+            self._spawn(self._started(crew, crew.cold.popleft()))
+
+    async def _started(self, crew: _Crew, worker: Worker) -> None:
+        await self._run(worker.start)
+        crew.starting = False
+        crew.free.append(worker)
+        self._dispatch(crew)
 
     def _turn(self, job: _Job) -> tuple[int, int, int]:
         """Next is the address that was served longest ago, then its client, then the question that came first."""
         return self._turns.get(job.client[0], 0), self._turns.get(job.client, 0), job.number
 
-    async def _ready(self, crew: _Crew, worker: Worker) -> None:
-        await asyncio.get_running_loop().run_in_executor(self._threads, worker.start)
-        crew.free.append(worker)
-        self._dispatch(crew)
-
     async def _work(self, crew: _Crew, worker: Worker, job: _Job) -> None:
         job.worker = worker
-        put = asyncio.get_running_loop().run_in_executor(
-            self._threads, worker.put, job, job.question, job.query, job.at.limits
-        )
         try:
-            outcome = await put
+            outcome = await self._run(worker.put, job, job.question, job.query, job.at.limits)
         finally:
             job.worker = None
         self._settle(job, outcome)
-        await self._ready(crew, worker)
+        if outcome in (Ended.BROKEN, Ended.TOO_LONG):
+            await self._run(worker.start)  # unless it has gone on
+        crew.free.append(worker)
+        self._dispatch(crew)
+
+    async def _run(self, work: Callable[P, R], *arguments: P.args, **named: P.kwargs) -> R:
+        """Do in a thread what waits for a process."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, partial(work, *arguments, **named))
 
     def _settle(self, job: _Job, outcome: Answer | Ended) -> None:
         stages = STAGES[job.question]
@@ -260,7 +270,7 @@ class Scheduler:
             job.stage += 1
             self._queue(job)
         elif outcome is Ended.TOO_LONG:
-            limit = sum(stage.processor for stage in stages)
+            limit = sum(stage.limits.processor for stage in stages)
             why = f"not done within {limit:.2g} seconds of computing; the command line has no such limit"
             self._finish(job, left_out(job.question, job.query, why), remember=True)
         elif outcome is Ended.BUSY:
