@@ -137,6 +137,30 @@ def test_a_flooding_client_is_refused_and_no_other(played, monkeypatch):
     assert other.status == 200
 
 
+def test_who_waits_too_long_for_a_worker_is_told(played, monkeypatch):
+    def naps(scheduler, seconds, client, name):
+        return scheduler.ask("map", does("nap", seconds=seconds, name=name), client)
+
+    async def play(scheduler):
+        slow = [asyncio.ensure_future(naps(scheduler, 60.0, ONE, f"slow-{i}")) for i in range(2)]
+        while sum(job.worker is not None for job in scheduler._under_way.values()) < 2:
+            await asyncio.sleep(0.05)
+        monkeypatch.setattr(scheduling, "_LONGEST_WAIT", 0.3)
+        told = await naps(scheduler, 0.0, OTHER, "a")
+        for one in slow:
+            one.cancel()
+        monkeypatch.setattr(scheduling, "_LONGEST_WAIT", 20.0)
+        return told, await naps(scheduler, 0.0, OTHER, "a")
+
+    told, again = played(play)
+    assert (told.status, said(told)["error"]) == (
+        422,
+        "this column of the map is left out: this machine is too busy now, ask again later",
+    )
+    # That is not remembered.
+    assert again.status == 200
+
+
 def test_what_nobody_waits_for_is_ended_or_not_begun(played, tmp_path):
     async def gone():
         return True

@@ -10,7 +10,7 @@ import asyncio
 import json
 import signal
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Any
 
@@ -127,7 +127,7 @@ def _worth(connection: Connection) -> tuple[bool, float]:
 class Server(uvicorn.Server):
     """A server that inspects its connections, and that ends without waiting for what is in work."""
 
-    def __init__(self, config: uvicorn.Config, end: Any) -> None:
+    def __init__(self, config: uvicorn.Config, end: Callable[[], None]) -> None:
         super().__init__(config)
         self._end = end
 

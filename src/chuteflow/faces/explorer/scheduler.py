@@ -65,8 +65,11 @@ STAGES: Mapping[str, tuple[Stage, ...]] = {
 }
 #: Answers that are remembered, questions of one address that are in work or wait, and clients whose turn is known.
 _REMEMBERED, _OF_ONE_ADDRESS, _KNOWN = 512, 256, 4096
-#: Seconds after which it is looked again whether anybody still waits for an answer.
-_PATIENCE = 0.25
+#: Seconds after which it is looked again whether anybody still waits for an answer, and that a question may wait for
+#: a worker.
+_PATIENCE, _LONGEST_WAIT = 0.25, 20.0
+#: Why there is no answer although there might be one.
+_TOO_BUSY = "this machine is too busy now, ask again later"
 
 
 @dataclass(eq=False)
@@ -79,6 +82,7 @@ class _Job:
     number: int
     given: asyncio.Future[Answer] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
     stage: int = 0
+    since: float = 0.0
     waits: int = 0
     broken: bool = False
     worker: Worker | None = None
@@ -183,11 +187,18 @@ class Scheduler:
             while not (await asyncio.wait({job.given}, timeout=_PATIENCE))[0]:
                 if gone is not None and await gone():
                     return problem(499, "nobody waits for this answer")
+                self._give_up_waiting(job)
             return job.given.result()
         finally:
             job.waits -= 1
             if not job.waits and not job.given.done():
                 self._take_back(job)
+
+    def _give_up_waiting(self, job: _Job) -> None:
+        waiting = self._crews[job.at.lane].waiting
+        if job in waiting and asyncio.get_running_loop().time() - job.since > _LONGEST_WAIT:
+            waiting.remove(job)
+            self._finish(job, left_out(job.question, job.query, _TOO_BUSY))
 
     def _take_back(self, job: _Job) -> None:
         waiting = self._crews[job.at.lane].waiting
@@ -210,6 +221,7 @@ class Scheduler:
 
     def _queue(self, job: _Job) -> None:
         crew = self._crews[job.at.lane]
+        job.since = asyncio.get_running_loop().time()
         crew.waiting.append(job)
         self._dispatch(crew)
 
@@ -274,7 +286,7 @@ class Scheduler:
             why = f"not done within {limit:.2g} seconds of computing; the command line has no such limit"
             self._finish(job, left_out(job.question, job.query, why), remember=True)
         elif outcome is Ended.BUSY:
-            self._finish(job, left_out(job.question, job.query, "this machine is too busy now, ask again later"))
+            self._finish(job, left_out(job.question, job.query, _TOO_BUSY))
         elif outcome is Ended.TAKEN_BACK or not job.broken:
             job.broken = outcome is Ended.BROKEN
             self._queue(job)
