@@ -13,7 +13,7 @@ import pytest
 
 SECONDS, CLIENTS, EXTREME = 60.0, 50, 10
 #: The ordinary clients together ask for so much of the time of one processor.
-SHARE = 0.5
+SHARE = 0.3
 
 
 class Client(threading.Thread):

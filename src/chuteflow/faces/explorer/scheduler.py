@@ -246,6 +246,8 @@ class Scheduler:
             self._spawn(self._started(crew, crew.cold.popleft()))
 
     async def _started(self, crew: _Crew, worker: Worker) -> None:
+        if self._closed:
+            return
         await self._run(worker.start)
         crew.starting = False
         crew.free.append(worker)
@@ -256,11 +258,15 @@ class Scheduler:
         return self._turns.get(job.client[0], 0), self._turns.get(job.client, 0), job.number
 
     async def _work(self, crew: _Crew, worker: Worker, job: _Job) -> None:
+        if self._closed:
+            return
         job.worker = worker
         try:
             outcome = await self._run(worker.put, job, job.question, job.query, job.at.limits)
         finally:
             job.worker = None
+        if self._closed:  # all who wait have been told
+            return
         self._settle(job, outcome)
         if outcome in (Ended.BROKEN, Ended.TOO_LONG):
             await self._run(worker.start)  # unless it has gone on
