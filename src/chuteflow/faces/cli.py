@@ -11,14 +11,17 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from io import TextIOWrapper
+from typing import Any
 
 import click
 
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.faces import interrupts
 from chuteflow.faces.commands import COMMANDS
+from chuteflow.processes import require_main_guard
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 class Commands(click.Group):
@@ -42,6 +45,13 @@ class Commands(click.Group):
             raise click.UsageError(f"there is no command {args[0]!r}: choose one of {', '.join(COMMANDS)}", ctx)
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an interrupt passes by click, which would add an empty line."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise interrupts.Interrupted(str(error)) from None
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of commands, without importing them."""
         with formatter.section("Commands"):
@@ -61,13 +71,21 @@ def chuteflow() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, by default on the arguments of the process, and return its exit code."""
+    # A worker that runs a script once more has no business here.
+    require_main_guard()
+    with interrupts.Interrupts():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             # A terminal that knows no Greek still gets its answer.
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = chuteflow.main(arguments, prog_name="chuteflow", standalone_mode=False)
-        sys.stdout.flush()
+        with interrupts.nothing_but_interrupts():
+            code = chuteflow.main(arguments, prog_name="chuteflow", standalone_mode=False)
+            sys.stdout.flush()
         return code if isinstance(code, int) else DONE
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "chuteflow"
@@ -76,8 +94,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(str(error), BAD_INPUT)
     except ChuteflowError as error:
         return _complain(str(error), FAILED)
-    except (click.Abort, KeyboardInterrupt):
-        return INTERRUPTED
+    except (click.Abort, KeyboardInterrupt, interrupts.Interrupted) as error:
+        interrupts.told()
+        if sys.stderr.isatty():
+            # A line of progress may stand there.
+            click.echo("\r\x1b[K", nl=False, err=True)
+        return _complain(str(error) or "interrupted", interrupts.INTERRUPTED)
     except BrokenPipeError:
         # Whoever read has gone; what is left in the buffer must not fail once more at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
 import time
 
 from chuteflow.sweeps.engine import solve_chunk
@@ -27,18 +25,3 @@ def work(path: str, chunk: int) -> Marker:
     )
     store.put(chunk, solved.arrays(), marker)
     return marker
-
-
-def end_with_parent() -> None:
-    """Let this worker end when the process that started it does, however that ends."""
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def wait() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()

@@ -6,15 +6,12 @@ worked out side by side in processes; the grid of the map is read off them.
 
 from __future__ import annotations
 
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +23,7 @@ from chuteflow.analysis.domains.plane import CODES, HOT_CODES, Axis, Plane, code
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
 from chuteflow.errors import InputError
+from chuteflow.processes import worker_pool
 from chuteflow.steady.chute import Chute
 
 #: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
@@ -175,6 +173,7 @@ def domain(
 
     Raises:
         InputError: for a size, tolerance, temperature or range out of bounds, or where a corner is no chute.
+        ChuteflowError: where the processes cannot start, or die.
     """
     if not (min(size) >= 1 and max(size) <= 5000):
         raise InputError(f"size {size[0]}x{size[1]}: must be from 1x1 to 5000x5000")
@@ -194,25 +193,11 @@ def domain(
     return Domain.on_cells(plane, size, tolerance, tuple(columns), tuple(hot_columns))
 
 
-@contextmanager
-def _pool(workers: int) -> Iterator[Executor | None]:
+def _pool(workers: int) -> AbstractContextManager[Executor | None]:
     """Processes to compute in, or None for this one."""
     if not 1 <= workers <= 256:
         raise InputError(f"workers = {workers}: must be from 1 to 256")
-    if workers == 1:
-        yield None
-        return
-    # Systems here are small: more threads gain nothing, and take the cores from the other processes.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_parent)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return worker_pool(workers) if workers > 1 else nullcontext()
 
 
 def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:

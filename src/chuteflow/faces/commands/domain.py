@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
+from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
     from chuteflow.analysis.domains import Domain
@@ -65,7 +65,7 @@ class Numbers(click.ParamType):
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
 @options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
 @options.search_range_options
-@options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each processor.")
+@options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
 @options.output_options
 def command(**given: Any) -> None:
     """Map, print, save and draw."""
@@ -80,7 +80,7 @@ def command(**given: Any) -> None:
     }
     workers = given["processes"]
     if workers is None:
-        workers = min(os.cpu_count() or 1, _MOST_PROCESSES)
+        workers = min(available_cores(), _MOST_PROCESSES)
     try:
         found = domain(chute, x, y, workers=workers, progress=_progress, **chosen, **options.search(given))
     finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -14,6 +13,7 @@ from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
+from chuteflow.processes import available_cores
 
 
 class Numbers(click.ParamType):
@@ -63,7 +63,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
 
     for path in names.values():
         require_writable(path, options.DRAWN)
-    flows = source(method or METHODS[0], workers())
+    flows = source(method or METHODS[0], available_cores())
     watched = sys.stderr.isatty()
     for number, path in names.items():
         begin = time.perf_counter()
@@ -95,8 +95,3 @@ def directory(name: str) -> Path:
     except OSError as error:
         raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
     return folder
-
-
-def workers() -> int:
-    """Processes that share the work where that pays: one for each core."""
-    return os.cpu_count() or 1

@@ -10,8 +10,9 @@ import click
 
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.faces.commands.figures import METHOD_HELP, Numbers, directory, workers
+from chuteflow.faces.commands.figures import METHOD_HELP, Numbers, directory
 from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
+from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
     from chuteflow.faces.report import Shown
@@ -37,7 +38,7 @@ def command(out: str | None, method: str | None, only: list[int] | None, no_clai
     from chuteflow.faces.report import Report, page
     from chuteflow.paper.sources import source
 
-    flows = source(method or METHODS[0], workers())
+    flows = source(method or METHODS[0], available_cores())
     figures = [_drawn(number, flows) for number in only or FIGURES]
     verdicts = [] if no_claims else _checked()
     report = Report(figures, verdicts, flows.words, started, time.perf_counter() - begin)

@@ -14,6 +14,7 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
+from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
     from chuteflow.sweeps.runner import Workers
@@ -93,9 +94,12 @@ def _workers(count: int | None, cluster: str | None) -> Workers:
 
 
 def _count(given: int | None) -> int:
-    # Not every system tells which cores a process may use.
-    affinity = getattr(os, "sched_getaffinity", None)
-    return given if given is not None else len(affinity(0)) if affinity else os.cpu_count() or 1
+    from chuteflow.sweeps.runner import require_count
+
+    if given is None:
+        return available_cores()
+    require_count(given)
+    return given
 
 
 def _chosen(study: Study, slices: Sequence[slice] | None) -> Sequence[int]:
@@ -118,8 +122,7 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool) 
                 progress.add(marker)
             progress.end()
     except KeyboardInterrupt:
-        click.echo(f"\nstopped; to go on: chuteflow {shlex.join(sys.argv[1:])}", err=True)
-        raise
+        raise KeyboardInterrupt(f"stopped; to go on: chuteflow {shlex.join(sys.argv[1:])}") from None
     click.echo(_summary(store))
 
 
