@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 from chuteflow.sweeps.engine import solve_chunk
-from chuteflow.sweeps.store import Marker, Store
+from chuteflow.sweeps.store import DamageError, Marker, Store
 
 
 def work(path: str, chunk: int) -> Marker:
-    """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done already."""
+    """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done and sound."""
     store = Store.opened(path)
-    if store.is_done(chunk):
-        return store.marker(chunk)
+    with suppress(DamageError):
+        return store.checked(chunk)
     begin = time.perf_counter()
     solved = solve_chunk(store.study, chunk)
     marker = Marker(
@@ -23,5 +24,4 @@ def work(path: str, chunk: int) -> Marker:
         seconds=round(time.perf_counter() - begin, 3),
         failures=dict(solved.failures),
     )
-    store.put(chunk, solved.arrays(), marker)
-    return marker
+    return store.put(chunk, solved.arrays(), marker)
