@@ -15,6 +15,7 @@ points and the counts of their markers.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import os
@@ -49,6 +50,8 @@ _FIRST_VERSION = "0.1.0"
 #: The name of a marker, and how its content begins: with the checksum of all that follows.
 _MARKER = re.compile(r"\d{8,}\.json", re.ASCII)
 _HEAD = re.compile(rb'\{"crc32": (\d+), ')
+#: Attributes that depend on the versions that wrote the store.
+_OF_VERSIONS = ("source", "history", "study", "study_digest")
 #: What reading an array that is damaged may raise.
 _DAMAGE = (ValueError, RuntimeError, LookupError, TypeError, OSError)
 _TITLE = "Every steady flow of many inclined chutes"
@@ -323,19 +326,20 @@ class Store:
     def damaged_metadata(self) -> list[str]:
         """Names of the arrays whose metadata are missing or damaged; "" for those of the whole store."""
         expected = self._expected(self._versions())
-        return sorted(name.removesuffix("zarr.json").rstrip("/") for name in expected if self._differs(expected, name))
+        names = [name for name, content in expected.items() if _essence(_json(self.path / name)) != _essence(content)]
+        return sorted(name.removesuffix("zarr.json").rstrip("/") for name in names)
 
     # Writing
 
-    def begin(self) -> None:
-        """Mend what is damaged of the metadata, and add this version to those that computed into the store.
+    def mend(self, *versions: str) -> None:
+        """Mend what is damaged of the metadata, and add ``versions`` to those that computed into the store.
 
         Raises:
             OSError: where that is impossible.
         """
-        expected = self._expected(tuple(dict.fromkeys((*self._versions(), __version__))))
+        expected = self._expected(dict.fromkeys((*self._versions(), *versions)))
         for name, content in expected.items():
-            if self._differs(expected, name):
+            if _json(self.path / name) != json.loads(content):
                 _put(self.path / name, content)
 
     def put(self, chunk: int, arrays: Mapping[str, NDArray[Any]], marker: Marker) -> Marker:
@@ -366,8 +370,7 @@ class Store:
 
         first, last = self.study.extent(chunk)
         # Into memory, so that a chunk gets to the disk whole or not at all.
-        metadata = _laid_out(self.study, checksums=self._has_checksums())
-        memory = _buffers(metadata)
+        memory = _buffers(_laid_out(self.study, checksums=self._has_checksums(), versions=()))
         group = self._opened(MemoryStore(memory))
         out = {}
         for name in _variables(self.study):
@@ -409,9 +412,6 @@ class Store:
 
     def _expected(self, versions: Iterable[str]) -> dict[str, bytes]:
         return _laid_out(self.study, checksums=self._has_checksums(), versions=tuple(versions))
-
-    def _differs(self, expected: Mapping[str, bytes], name: str) -> bool:
-        return _json(self.path / name) != json.loads(expected[name])
 
     # Clients
 
@@ -521,6 +521,17 @@ def _json(path: Path) -> dict[str, Any]:
     return given if isinstance(given, dict) else {}
 
 
+def _essence(metadata: bytes | dict[str, Any]) -> dict[str, Any]:
+    """Metadata but for what may differ between versions of the program: names of them, and the form of the study."""
+    given = dict(json.loads(metadata) if isinstance(metadata, bytes) else metadata)
+    attributes = given.get("attributes")
+    if isinstance(attributes, dict) and "study" in attributes:
+        study, digest = str(attributes["study"]), attributes.get("study_digest")
+        rest = {name: value for name, value in attributes.items() if name not in _OF_VERSIONS}
+        given["attributes"] = rest | {"sound": hashlib.sha256(study.encode()).hexdigest() == digest}
+    return given
+
+
 def _root(path: Path) -> dict[str, Any]:
     given = _json(path / "zarr.json")
     return given if isinstance(given.get("attributes", {}), dict) else {}
@@ -544,12 +555,12 @@ def _lay_out(path: Path, study: Study) -> None:
     """Make the folders and the metadata of a store without a chunk."""
     (path / _OWN / _DONE).mkdir(parents=True)
     Store(path, study).write_study()
-    for name, content in _laid_out(study).items():
+    for name, content in _laid_out(study, checksums=True, versions=(__version__,)).items():
         _put(path / name, content)
 
 
 @lru_cache(maxsize=4)
-def _laid_out(study: Study, *, checksums: bool = True, versions: tuple[str, ...] = (__version__,)) -> dict[str, bytes]:
+def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
     """The metadata of a store by their place in it, as Zarr writes them."""
     import zarr
     from zarr.codecs import BytesCodec, Crc32cCodec, ZstdCodec

@@ -130,8 +130,7 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
             found = _Found(store, chunks, check=check)
             for line in found.damage_lines():
                 click.echo(f"{line}: computed again", err=True)
-            if len(found.sound) < len(chunks):
-                _begin(store, found)
+            _begin(store, found, computing=len(found.sound) < len(chunks))
             progress = Progress(len(chunks), len(found.sound))
             for marker in run(store, (chunk for chunk in chunks if chunk not in found.sound), workers):
                 progress.add(marker)
@@ -144,20 +143,20 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
     click.echo("\n".join(_totals(store, found.totals + others.totals)))
 
 
-def _begin(store: Store, found: _Found) -> None:
+def _begin(store: Store, found: _Found, *, computing: bool) -> None:
+    """Put the metadata in order, and say what has to be known of the store before chunks are added."""
     from chuteflow.sweeps.store import StoreError
 
     for name in store.damaged_metadata():
-        if name and found.totals.chunks:
-            click.echo(f"the metadata of {name} are damaged: written again", err=True)
+        click.echo(f"the metadata of {name or 'the store'} are damaged: written again", err=True)
     others = [version for version in found.totals.versions if version != __version__]
-    if others:
+    if others and computing:
         click.echo(
             f"the store has chunks of chuteflow {', '.join(others)}; those computed now are of chuteflow {__version__}",
             err=True,
         )
     try:
-        store.begin()
+        store.mend(*([__version__] if computing else []))
     except OSError as error:
         raise StoreError(f"cannot write the metadata of {store.path}: {error.strerror or error}") from None
 
