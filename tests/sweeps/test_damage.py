@@ -374,3 +374,11 @@ def test_a_marker_is_what_it_was():
     assert Marker.of(marker.content, 3) == marker
     with pytest.raises(DamageError, match="another chunk"):
         Marker.of(marker.content, 4)
+
+
+def test_a_study_whose_bits_flipped_to_another_is_written_again(sound, damaged, capsys):
+    path = damaged / ".chuteflow" / "study.json"
+    before = path.read_bytes()
+    path.write_bytes(before.replace(b'"e":0.8', b'"e":0.9'))
+    assert "4 of 4 chunks" in status(sound, damaged, capsys)
+    assert path.read_bytes() == before

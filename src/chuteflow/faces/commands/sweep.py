@@ -32,6 +32,8 @@ _EPILOG = (
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
 _SELDOM, _OFTEN = 10.0, 0.2
+#: Chunks at most where they are given by several slices.
+_MOST_IN_SLICES = 10_000_000
 #: Chunks that are damaged that are named; the others are counted.
 _MOST_LINES = 20
 #: Points that the time is estimated from: by a few, and by more.
@@ -116,6 +118,8 @@ def _chosen(study: Study, slices: Sequence[slice] | None) -> Sequence[int]:
         return every
     # One slice of very many chunks is never laid out.
     parts = [every[part] for part in slices]
+    if len(parts) > 1 and sum(map(len, parts)) > _MOST_IN_SLICES:
+        raise InputError(f"--chunks: several slices may have {_MOST_IN_SLICES} chunks, not more: give one slice")
     chosen = parts[0] if len(parts) == 1 else sorted({chunk for part in parts for chunk in part})
     if not chosen:
         raise InputError(f"--chunks: the study has chunks 0 to {study.chunks - 1}, none of those asked for")
