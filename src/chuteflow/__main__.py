@@ -8,17 +8,19 @@ def run() -> int:
 
     Interrupts are taken care of before anything large is imported, and up to the end of the process.
     """
-    from chuteflow.faces import interrupts
+    try:
+        from chuteflow.faces import interrupts
 
-    with interrupts.Interrupts(to_the_end=True):
-        try:
+        with interrupts.Interrupts(to_the_end=True):
             from chuteflow.faces.cli import main
 
             return main()
-        except KeyboardInterrupt:
-            interrupts.told()
-            print("chuteflow: interrupted", file=sys.stderr)
-            return interrupts.INTERRUPTED
+    except KeyboardInterrupt:
+        from chuteflow.faces import interrupts
+
+        interrupts.told()
+        print("chuteflow: interrupted", file=sys.stderr)
+        return interrupts.INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ thread ends the process if it is still there after a moment.
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Event, Thread, current_thread, main_thread
 from types import FrameType, TracebackType
 from typing import Any
@@ -68,13 +69,16 @@ class Interrupts:
 
     def _install(self) -> None:
         Interrupts.current = self
+        if self._to_the_end:
+            # Registered before all others, so that it runs after them.
+            atexit.register(self._end)
         self._near, far = socket.socketpair()
         self._near.setblocking(False)
+        Thread(target=self._watch, args=(far,), daemon=True).start()
         self._hook, sys.unraisablehook = sys.unraisablehook, self._unraisable
-        signal.signal(signal.SIGINT, self._handle)
         self._before = signal.set_wakeup_fd(self._near.fileno(), warn_on_full_buffer=False)
         self._installed = True
-        Thread(target=self._watch, args=(far,), daemon=True).start()
+        signal.signal(signal.SIGINT, self._handle)
 
     def _handle(self, _: int, __: FrameType | None) -> None:
         if not self.seen:
@@ -89,6 +93,14 @@ class Interrupts:
                     if not self.told:
                         os.write(2, b"chuteflow: interrupted\n")
                     os._exit(INTERRUPTED)
+
+    def _end(self) -> None:
+        """End with the exit code of an interrupt: Python has another one if the exception passed ``exec``."""
+        if self.told:
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+                sys.stderr.flush()
+            os._exit(INTERRUPTED)
 
     def _unraisable(self, given: Any) -> None:
         """An interrupt that falls into a destructor is lost there; it needs no words."""
