@@ -18,9 +18,7 @@ def run() -> int:
     except KeyboardInterrupt:
         from chuteflow.faces import interrupts
 
-        interrupts.told()
-        print("chuteflow: interrupted", file=sys.stderr)
-        return interrupts.INTERRUPTED
+        return interrupts.tell()
 
 
 if __name__ == "__main__":

@@ -49,6 +49,14 @@ LONG = {
 }
 
 
+@pytest.fixture(autouse=True)
+def _heard():
+    """Interrupts as at a terminal, also where the tests run in the background of a shell, which ignores them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def started(command, folder):
     (folder / "study.toml").write_text(STUDY)
     return subprocess.Popen(

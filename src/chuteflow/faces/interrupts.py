@@ -20,6 +20,7 @@ from typing import Any
 
 #: The exit code of a command that was interrupted.
 INTERRUPTED = 130
+_LINE = b"chuteflow: interrupted\n"
 #: Seconds after an interrupt in which a command may clean up.
 _GRACE = 1.5
 
@@ -91,7 +92,7 @@ class Interrupts:
             while received := far.recv(64):
                 if signal.SIGINT in received and not self._over.wait(_GRACE):
                     if not self.told:
-                        os.write(2, b"chuteflow: interrupted\n")
+                        os.write(2, _LINE)
                     os._exit(INTERRUPTED)
 
     def _end(self) -> None:
@@ -124,3 +125,10 @@ def told() -> None:
     """Say that the user knows of the interrupt."""
     if Interrupts.current is not None:
         Interrupts.current.told = True
+
+
+def tell() -> int:
+    """Tell the user of an interrupt that no command told, and return the exit code."""
+    told()
+    os.write(2, _LINE)
+    return INTERRUPTED
