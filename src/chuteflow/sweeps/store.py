@@ -22,7 +22,6 @@ import os
 import re
 import secrets
 import shutil
-import warnings
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
@@ -587,13 +586,15 @@ def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> di
             dimension_names=["point", "flow"] if variable.by_flow else ["point"],
             attributes=variable.attributes,
         )
-    with warnings.catch_warnings():
-        # That other programs may not know it does no harm: readers that do need not list the folder.
-        warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(store)
     # An empty group, so that readers that list the folder know what it is.
     zarr.create_group(store, path=_OWN)
-    return {name: content.to_bytes() for name, content in memory.items()}
+    contents = {name: content.to_bytes() for name, content in memory.items()}
+    # Readers that know consolidated metadata need not list the folder. Zarr writes them with a warning that they are
+    # not in the standard, which cannot be held back where several threads compute.
+    arrays = {name: json.loads(contents[f"{name}/zarr.json"]) for name in variables(study)}
+    consolidated = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    root = json.loads(contents["zarr.json"]) | {"consolidated_metadata": consolidated}
+    return contents | {"zarr.json": json.dumps(root).encode()}
 
 
 def _buffers(contents: Mapping[str, bytes]) -> dict[str, Any]:
