@@ -95,6 +95,8 @@ VALUES = (
     "1979-05-27T07:32:00Z",
     "'''\n'''",
 )
+#: Values that may well be meant.
+ORDINARY = ("0.3", "2", "[0.3, 0.31]", "{from = 0.2, to = 0.3, points = 2}", '"free"', '"lun"', "1e-6", "[1e-2, 1e4]")
 FIELDS = (
     "9" * 140000,
     "",
@@ -152,8 +154,10 @@ def told_or_solved(folder, seed, capsys):
     text = rng.choice(GOOD)
     table = "points.csv" in text and rng.random() < 0.6
     path = folder / f"{seed}.toml"
-    path.write_bytes(text.encode() if table else fuzzed(rng, text, VALUES))
-    (folder / "points.csv").write_bytes(fuzzed(rng, CSV, FIELDS) if table else CSV.encode())
+    path.write_bytes(text.encode() if table else fuzzed(rng, text, VALUES if rng.random() < 0.5 else ORDINARY))
+    (folder / "points.csv").write_bytes(
+        fuzzed(rng, CSV, FIELDS if rng.random() < 0.5 else ORDINARY) if table else CSV.encode()
+    )
     code = main(["sweep", str(path), "--out", str(folder / "none.zarr"), "--status"])
     told = capsys.readouterr()
     assert code == 2, seed
@@ -208,6 +212,6 @@ def test_a_few_fuzzed_studies(tmp_path, capsys):
 def test_fuzzed_studies(tmp_path, capsys):
     count = int(os.environ.get("CHUTEFLOW_FUZZ_STUDIES", "300"))
     found = [told_or_solved(tmp_path, 1000 + seed, capsys) for seed in range(count)]
-    assert 0.05 * count < sum(found) < 0.95 * count
+    assert 0.02 * count < sum(found) < 0.98 * count
     with capsys.disabled():
         print(f"\nfuzzed studies: {count}, of which {sum(found)} are studies")
