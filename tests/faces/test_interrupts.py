@@ -344,7 +344,7 @@ def test_the_explorer_needs_nothing_that_windows_lacks(served):
 # At any time
 
 
-@pytest.mark.parametrize("name", ["sweep", "relax"])
+@pytest.mark.parametrize("name", ["sweep", "claims"])
 def test_a_command_ends_soon_after_two_interrupts(tmp_path, name):
     code, _, told = interrupted(name, tmp_path / name, 2.5, (0.005,)) or (None, 0.0, "")
     require_clean_end(name, code, told, tmp_path / name)
