@@ -6,19 +6,21 @@ holds the unknowns, those of all flows one after the other.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5netcdf
 import numpy as np
 
 from chuteflow import __version__
 from chuteflow.analysis.results import KINDS, Curve
-from chuteflow.faces import records
-from chuteflow.faces.contract import factor
+from chuteflow.checks import whole
+from chuteflow.errors import InputError
+from chuteflow.faces import contract, records
+from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
 from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity, Scales
@@ -27,13 +29,15 @@ from chuteflow.steady.solver import Status
 _INTERIORS = ("dissipative", "mixed", "productive")
 _DENSITIES = ("monotonic", "inverted")
 _STATUS = tuple(Status)
+#: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
+_LARGEST = 50_000_000
 _PER_FLOW = {"degree": "i4", "stretch": "f8", "error": "f8"}
 
 
-def write(result: Result, path: Path, scales: Scales | None) -> None:
-    """Write ``result`` to ``path``."""
+def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
+    """Write ``result`` to ``stream``, in memory: HDF5 may end the process where a disk is full."""
     found = records.rows(result)
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(stream, "w") as file:
         file.dimensions = {"flow": len(found), "height_index": HEIGHTS}
         file.attrs.update(_attributes(result, scales))
         _write_numbers(file, found, scales)
@@ -53,25 +57,39 @@ def read(path: Path) -> Result:
     """
     with h5netcdf.File(path, "r") as file:
         group = file.groups["restore"]
-        head = json.loads(group.attrs["head"])
-        records.require_format(head)
-        columns = {name: variable[...] for name, variable in group.variables.items()}
-    chute = records.chute_from(head["chute"])
-    ends = np.cumsum(columns["unknowns"])
-    kinds = ("", *KINDS)
-    found = [
-        records.row_from(
-            chute,
-            {name: columns[name][i] for name in (*_PER_FLOW, "macroscopic", "branch")}
-            | {
-                "z": columns["z"][end - columns["unknowns"][i] : end],
-                "status": _STATUS[columns["status"][i]].name,
-                "special": kinds[columns["special"][i]],
-            },
-        )
-        for i, end in enumerate(ends)
-    ]
-    return records.rebuilt(head, found)
+        head = contract.parsed(group.attrs["head"])
+        require_moderate(group)
+        columns = {name: variable[...].tolist() for name, variable in group.variables.items()}
+    return records.restored(head, list(_rows(columns)))
+
+
+def require_moderate(group: h5netcdf.Group) -> None:
+    """Check that the variables of ``group`` are not larger than any result: a file can claim any size.
+
+    Raises:
+        InputError: for one that is.
+    """
+    for name, variable in group.variables.items():
+        if math.prod(variable.shape) > _LARGEST:
+            raise InputError(f"{name} claims {math.prod(variable.shape)} numbers")
+
+
+def _rows(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
+    """The values of each flow, as :func:`records.unknowns` gives them."""
+    lengths = [whole("the number of unknowns", length, 0) for length in columns["unknowns"]]
+    if sum(lengths) != len(columns["z"]):
+        raise InputError("a flow has the wrong number of unknowns")
+    statuses, kinds = [status.name for status in _STATUS], ("", *KINDS)
+    end = 0
+    for i, length in enumerate(lengths):
+        end += length
+        yield {name: columns[name][i] for name in ("degree", "stretch", "branch")} | {
+            "z": columns["z"][end - length : end],
+            "macroscopic": [finite(value) for value in columns["macroscopic"][i]],
+            "error": None if columns["error"][i] == math.inf else columns["error"][i],
+            "status": statuses[whole("status", columns["status"][i], 0, len(statuses) - 1)],
+            "special": kinds[whole("special", columns["special"][i], 0, len(kinds) - 1)],
+        }
 
 
 def _attributes(result: Result, scales: Scales | None) -> dict[str, Any]:
@@ -149,7 +167,7 @@ def _write_profiles(file: h5netcdf.File, found: Sequence[Row], scales: Scales | 
 def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row]) -> None:
     solutions = [row.flow.solution for row in found]
     group.attrs["long_name"] = "discretised unknowns, from which chuteflow rebuilds the flows to the last bit"
-    group.attrs["head"] = json.dumps(records.head(result), allow_nan=False)
+    group.attrs["head"] = contract.text(records.head(result, found))
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]

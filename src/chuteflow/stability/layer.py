@@ -34,8 +34,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients
-from chuteflow.theory.laws import law
+from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
 from chuteflow.theory.transport import Grains, Vector, traction
 
 #: Degree of the grid in m.
@@ -104,6 +103,7 @@ class Layer:
     """
 
     chute: Chute
+    law: Law
     mass_holdup: float
     stretch: float
     degree: int = DEGREE
@@ -119,9 +119,9 @@ class Layer:
             raise InputError(
                 "the interface is known for steady flows alone: time needs the free surface, give --surface free"
             )
-        Grains(law(flow.chute.closure), flow.chute.restitution, flow.chute.slope)
+        Grains(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
-        return cls(flow.chute, flow.mass_holdup, stretch, degree)
+        return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
 
     @property
     def _grid(self) -> LobattoGrid:
@@ -181,7 +181,7 @@ class Layer:
 
     def base_density(self, state: Array) -> float:
         """nu at the base over that of the densest packing."""
-        return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / law(self.chute.closure).densest)
+        return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / self.law.densest)
 
     def numbers(self, state: Array) -> tuple[float, float, float, float]:
         """Q, h, and T at the surface and at the base."""
@@ -238,9 +238,8 @@ class Layer:
         )
 
     def _coefficients(self, nu: Array) -> Coefficients:
-        chosen = law(self.chute.closure)
-        room = 1.0 - nu / chosen.densest
-        return chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope)
+        room = 1.0 - nu / self.law.densest
+        return self.law.coefficients(nu, room, self.chute.restitution, self.chute.slope)
 
     def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:
         """P_xz and q at the base, and the energy lost to it, (2.9)-(2.15)."""

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton
@@ -82,14 +83,16 @@ class Solution:
         return self.problem.state(self.z)
 
 
-def checked_tolerance(tolerance: float) -> None:
-    """Check a relative tolerance.
+def checked_tolerance(tolerance: float) -> float:
+    """A relative tolerance as it was given, once it is sure that it can be asked for.
 
     Raises:
         InputError: if it is out of range.
     """
-    if not 1e-11 <= tolerance <= 1e-3:
-        raise InputError(f"tolerance {tolerance:g}: must be from 1e-11 to 1e-3")
+    asked = number("tolerance", tolerance)
+    if not 1e-11 <= asked <= 1e-3:
+        raise InputError(f"tolerance {asked:g}: must be from 1e-11 to 1e-3")
+    return asked
 
 
 def default_stretch(model: Model, mass: float, temperature: float) -> float:
