@@ -31,6 +31,7 @@ _FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def curve(
     chute: Chute,
     *,

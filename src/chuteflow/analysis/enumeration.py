@@ -40,6 +40,7 @@ _QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def flows(
     chute: Chute,
     *,

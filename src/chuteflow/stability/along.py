@@ -72,6 +72,7 @@ class MarkedCurve:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 

@@ -149,6 +149,7 @@ class FamilyMap:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def wave_map(
     flow: Flow,
     *,
@@ -192,6 +193,7 @@ def wave_map(
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def family_map(
     flows: Sequence[Flow],
     *,

@@ -92,6 +92,7 @@ def _at_rest(layer: Layer, first: Moment, last: Moment) -> bool:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def outcome(layer: Layer, moments: Sequence[Moment]) -> Outcome:
     """Which steady flow the last of ``moments`` is nearest to, and whether it approaches."""
     steady = tuple(flows(layer.chute, M=layer.mass_holdup))

@@ -54,6 +54,7 @@ class Stability:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None) -> Stability:
     """Whether ``flow`` is stable, from a search over wavenumbers.
 
@@ -88,6 +89,7 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
     """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
 
@@ -294,6 +296,7 @@ class GrowthMap:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def growth_map(disturbances: Disturbances, kx: Array, ky: Array) -> GrowthMap:
     """The leading mode at each pair of wavenumbers, about 40 ms for each.
 

@@ -24,6 +24,8 @@ CUTOFF = 0.01
 _SAMPLES = 96
 #: Heights of a profile at most.
 _MOST_POINTS = 1_000_000
+#: Far above the base, what falls off exponentially becomes zero.
+_vanishing = np.errstate(under="ignore")
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -239,6 +241,7 @@ class Flow:
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
@@ -313,6 +316,7 @@ class Flow:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
+    @_vanishing
     def _shares_at(self, z: Array) -> Array:
         """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
@@ -331,6 +335,7 @@ class Flow:
                 break
         return np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
 
+    @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         at, f = self._at_share(share)
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
@@ -365,6 +370,7 @@ def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
     return flows
 
 
+@_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem

@@ -106,6 +106,8 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
     return other, np.concatenate([z[..., :-2] @ matrix.T, z[..., -2:]], axis=-1)
 
 
+# A flow that runs away is told by what is not finite.
+@np.errstate(all="ignore")
 def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
     """The flow nearest to ``z`` that meets ``condition``.
 

@@ -142,6 +142,7 @@ class BoundarySet(Sequence[Boundary]):
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def boundary(
     chute: Chute,
     *,

@@ -150,6 +150,7 @@ class Domain:
 
 
 @on_one_thread
+@np.errstate(under="ignore")
 def domain(
     chute: Chute,
     x: Axis | tuple[str, float, float],
