@@ -44,6 +44,8 @@ FIELDS = 4
 _SMALLEST = 1e-250
 #: Imaginary step of derivatives, far below rounding.
 _STEP = 1e-40
+#: Densities far above the base fall off to zero.
+_vanishing = np.errstate(under="ignore")
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,7 @@ class Layer:
         rate = stretch_map(self._grid.nodes, self.stretch)[1]
         return self._grid.derivative / (self.mass_holdup * rate)[:, None]
 
+    @_vanishing
     def steady(self, flow: Flow) -> Array:
         """The state that ``flow``, of the same hold-up, is."""
         profile = flow.at_overburden(np.maximum(self.mass / self.mass_holdup, _SMALLEST))
@@ -149,6 +152,7 @@ class Layer:
         tau = T * self._coefficients(nu).compressibility
         return np.concatenate([np.log(tau), profile.velocity, np.zeros_like(nu), np.log(T)])
 
+    @_vanishing
     def rate(self, state: Array) -> Array:
         """d state/dt; ``state`` may be many (..., 4 (degree + 1))."""
         log_tau, _, _, log_T = self._fields(state)
@@ -164,6 +168,7 @@ class Layer:
         fields[..., 3, :] = heating / (1.5 * np.exp(log_T))
         return fields.reshape(state.shape)
 
+    @_vanishing
     def jacobian(self, state: Array) -> Array:
         """d rate/d state, exact (complex steps)."""
         stepped: Any = state + _STEP * 1j * np.eye(len(state))
@@ -179,10 +184,12 @@ class Layer:
         values = np.linalg.eigvals(self.jacobian(state)[np.ix_(moving, moving)]).astype(complex)
         return values[np.argsort(-np.real(values))]
 
+    @_vanishing
     def base_density(self, state: Array) -> float:
         """nu at the base over that of the densest packing."""
         return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / self.law.densest)
 
+    @_vanishing
     def numbers(self, state: Array) -> tuple[float, float, float, float]:
         """Q, h, and T at the surface and at the base."""
         log_tau, u, _, log_T = self._fields(state)
