@@ -80,7 +80,7 @@ def checked_size(size: Any, fewest: int, most: int) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise InputError(f"size = {shown(size)}: {allowed}") from None
     if not (fewest <= min(x, y) and max(x, y) <= most):
-        raise InputError(f"size {x}x{y}: {allowed}")
+        raise InputError(f"size {shown(x)}x{shown(y)}: {allowed}")
     return x, y
 
 
@@ -105,8 +105,9 @@ def shown(value: Any) -> str:
     """``value`` for a message: on one line, and not too long."""
     try:
         text = f"{value:g}" if isinstance(value, float) else repr(value)
-    except (ValueError, OverflowError):
-        text = f"an integer of {value.bit_length()} bits"  # Python does not print very long ones
+    except ValueError:
+        # Python does not print very long integers.
+        text = f"an integer of {value.bit_length()} bits" if isinstance(value, int) else f"a {type(value).__name__}"
     text = " ".join(text.split())
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 

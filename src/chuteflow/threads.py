@@ -11,7 +11,6 @@ import os
 import sys
 from collections.abc import Callable
 from functools import lru_cache, wraps
-from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -43,45 +42,16 @@ def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
-        with _limit:
+        with _controller(frozenset(_LIBRARIES & sys.modules.keys())).limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return limited
 
 
-class _Limit:
-    """The limit in force, entered any number of times, by any number of Python threads.
-
-    The libraries have one setting for the whole process: the first to enter sets it, and the last to leave gives
-    back what was before. A library that was loaded in between is limited by whoever enters next.
-    """
-
-    def __init__(self) -> None:
-        self._lock = RLock()
-        self._depth = 0
-        self._limited: list[tuple[frozenset[str], Any]] = []
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._depth += 1
-            loaded = frozenset(_LIBRARIES & sys.modules.keys())
-            if all(loaded != before for before, _ in self._limited):
-                self._limited.append((loaded, _controller(loaded).limit(limits=1, user_api="blas")))
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._depth -= 1
-            while self._limited and self._depth == 0:
-                self._limited.pop()[1].restore_original_limits()
-
-
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=len(_LIBRARIES) ** 2)
 def _controller(loaded: frozenset[str]) -> Any:
-    """The libraries of linear algebra in this process, where the modules ``loaded`` are."""
+    """What sets the threads of the libraries of linear algebra that came with the modules ``loaded``."""
     del loaded
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
-
-
-_limit = _Limit()

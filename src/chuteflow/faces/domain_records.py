@@ -363,13 +363,9 @@ def _put(group: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray,
 
 
 def _kept_in_netcdf(path: Path) -> Any:
-    import h5netcdf
+    from chuteflow.faces.netcdf_file import restored_group
 
-    with h5netcdf.File(path, "r") as file:
-        group = file.groups["restore"]
+    with restored_group(path) as group:
         if group.attrs.get("kind") != KIND:
             return None
-        from chuteflow.faces.netcdf_file import require_moderate
-
-        require_moderate(group)
-        return contract.parsed(bytes(group.variables["columns"][...]))
+        return contract.parsed(bytes(group["columns"][...]))

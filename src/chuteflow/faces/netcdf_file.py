@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5netcdf
+import h5py
 import numpy as np
 
 from chuteflow import __version__
@@ -31,6 +33,7 @@ _DENSITIES = ("monotonic", "inverted")
 _STATUS = tuple(Status)
 #: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
 _LARGEST = 50_000_000
+_INTEGERS = ("unknowns", "status", "branch", "special")
 _PER_FLOW = {"degree": "i4", "stretch": "f8", "error": "f8"}
 
 
@@ -55,23 +58,29 @@ def read(path: Path) -> Result:
         InputError: for a later or unknown format.
         OSError, ValueError, KeyError, TypeError: for a file that is not of this format.
     """
-    with h5netcdf.File(path, "r") as file:
-        group = file.groups["restore"]
+    with restored_group(path) as group:
         head = contract.parsed(group.attrs["head"])
-        require_moderate(group)
-        columns = {name: variable[...].tolist() for name, variable in group.variables.items()}
+        columns = {name: group[name][...].tolist() for name in (*_PER_FLOW, *_INTEGERS, "z", "macroscopic")}
     return records.restored(head, list(_rows(columns)))
 
 
-def require_moderate(group: h5netcdf.Group) -> None:
-    """Check that the variables of ``group`` are not larger than any result: a file can claim any size.
+@contextmanager
+def restored_group(path: Path) -> Iterator[h5py.Group]:
+    """The group of a file that restores its result, once it is sure that it is not larger than any result.
+
+    It is read without h5netcdf, which leaves what it has of a damaged file to complain when it is collected.
 
     Raises:
-        InputError: for one that is.
+        InputError: where a variable is too large: a file can claim any size.
+        OSError, KeyError: for a file that is damaged.
     """
-    for name, variable in group.variables.items():
-        if math.prod(variable.shape) > _LARGEST:
-            raise InputError(f"{name} claims {math.prod(variable.shape)} numbers")
+    with h5py.File(path, "r") as file:
+        group = file["restore"]
+        for name in group:
+            size = math.prod(group[name].shape)
+            if size > _LARGEST:
+                raise InputError(f"{name} claims {size} numbers")
+        yield group
 
 
 def _rows(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
