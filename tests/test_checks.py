@@ -56,7 +56,7 @@ def test_what_is_no_number_is_refused_in_one_line(value):
         lambda: domain(PAPER, ("slope", 0.3, 0.4), ("roughness", 0.5, 0.6), size=value),
         lambda: domain(PAPER, ("slope", 0.3, 0.4), ("roughness", 0.5, 0.6), tolerance=value),
         lambda: domain(PAPER, ("slope", 0.3, 0.4), ("roughness", 0.5, 0.6), temperatures=(value,)),
-        lambda: whole("points", value, 0),
+        lambda: whole("points", value, 0, 30),
     ]
     for ask in asked:
         with pytest.raises(InputError) as caught:

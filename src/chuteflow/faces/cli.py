@@ -109,7 +109,7 @@ def _prepare_streams() -> None:
 
 def _abandon(stream: TextIO) -> None:
     """Let what is left in the buffer of ``stream`` go to nowhere, so that it does not fail once more at exit."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
