@@ -16,26 +16,35 @@ _MOST_SHOWN = 60
 
 
 def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
-    """``value`` as a float from ``low`` to ``high``: a real number of Python, numpy or another library.
-
-    Text, truth values, complex numbers, arrays and what is not finite are refused, however they convert.
+    """``value`` as a finite float from ``low`` to ``high``, see :func:`real`.
 
     Raises:
         InputError: naming ``name``, what was given and what is allowed.
     """
-    if not _is_real(value):
-        raise InputError(f"{name} = {shown(value)}: must be a number{_from_to(low, high)}")
-    try:
-        found = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {shown(value)}: must be a number{_from_to(low, high)}") from None
-    except OverflowError:
-        found = math.inf
+    found = real(name, value, _from_to(low, high))
     if not math.isfinite(found):
         raise InputError(f"{name} = {shown(value)}: must be a finite number{_from_to(low, high)}")
     if not low <= found <= high:
         raise InputError(f"{name} = {shown(value)}: must be{_from_to(low, high)}")
     return found
+
+
+def real(name: str, value: Any, allowed: str = "") -> float:
+    """``value`` as a float, finite or not: a real number of Python, numpy or another library.
+
+    Text, truth values, complex numbers and arrays are refused, however they convert.
+
+    Raises:
+        InputError: naming ``name``, what was given and what is ``allowed``.
+    """
+    try:
+        if _is_real(value):
+            return float(value)
+    except OverflowError:
+        return math.inf
+    except (TypeError, ValueError):
+        pass
+    raise InputError(f"{name} = {shown(value)}: must be a number{allowed}")
 
 
 def whole(name: str, value: Any, low: float, high: float = math.inf) -> int:

@@ -18,7 +18,7 @@ _BUSY = 10
 
 CHUTE = {"--slope": "0.3", "--e": "0.8", "--ew": "0.8", "--roughness": "0.6"}
 #: Values that are of no use to most options.
-STRANGE = (
+STRANGE: tuple[str, ...] = (
     "", " ", "nan", "-nan", "inf", "-inf", "1e400", "-1e400", "1e-400", "0", "-0", "-1", "1" * 400, "9" * 5000, "0x10",
     "1_0", "1,5", "½", "٣", "3j", "True", "None", "[]", "{}", "--", "-", ":", "1:", ":1", "1:2:3", "2:1", "nan:nan",
     "0:inf", "1e-30:1e30", "x", "3x3x3", "x3", "0x0", "-1x4", "1e9x1", "1 m", "1 furlong", "1e400 m", "m", "1 kg/m/s",
@@ -67,6 +67,8 @@ INSTEAD = {
     "report": ("--only", ("99", "0", "2,,3", "-1", "x")),
     "claims": ("--only", ("moderate-density", "99", "?")),
     "explore": ("--port", ("-1", "99999", "x")),
+    "growth": ("--size", SIZES),
+    "neutral": ("--size", SIZES),
 }
 
 

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -65,7 +66,7 @@ def test_nothing_to_draw_is_drawn_with_its_reason(tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {"a.png", "b.svg"}
 
 
-SETTINGS = {
+SETTINGS: dict[Any, Any] = {
     "text.usetex": True,
     "font.family": "no such font",
     "figure.autolayout": True,

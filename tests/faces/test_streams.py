@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
@@ -41,7 +42,8 @@ def test_readers_that_go_away_are_a_failure_without_a_word(closed):
     near, far = os.pipe()
     os.close(near)
     try:
-        streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE} | dict.fromkeys(closed, far)
+        streams: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        streams |= dict.fromkeys(closed, far)
         done = subprocess.run([sys.executable, "-m", "chuteflow", "hot", *PAPER.split()], **streams, check=False)
     finally:
         os.close(far)

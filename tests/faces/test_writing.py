@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -133,7 +134,7 @@ def test_files_of_killed_processes_are_removed_and_those_of_others_stay(tmp_path
         alive.kill()
 
 
-def started(code, folder):
+def started(code, folder) -> Any:
     return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=folder)
 
 

@@ -65,7 +65,7 @@ def read(path: Path) -> Result:
 
 
 @contextmanager
-def restored_group(path: Path) -> Iterator[h5py.Group]:
+def restored_group(path: Path) -> Iterator[Any]:
     """The group of a file that restores its result, once it is sure that it is not larger than any result.
 
     It is read without h5netcdf, which leaves what it has of a damaged file to complain when it is collected.
@@ -75,7 +75,7 @@ def restored_group(path: Path) -> Iterator[h5py.Group]:
         OSError, KeyError: for a file that is damaged.
     """
     with h5py.File(path, "r") as file:
-        group = file["restore"]
+        group: Any = file["restore"]
         for name in group:
             size = math.prod(group[name].shape)
             if size > _LARGEST:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from chuteflow.checks import number
+from chuteflow.checks import real
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton
@@ -89,7 +89,7 @@ def checked_tolerance(tolerance: float) -> float:
     Raises:
         InputError: if it is out of range.
     """
-    asked = number("tolerance", tolerance)
+    asked = real("tolerance", tolerance)
     if not 1e-11 <= asked <= 1e-3:
         raise InputError(f"tolerance {asked:g}: must be from 1e-11 to 1e-3")
     return asked
