@@ -79,7 +79,8 @@ def command_line(dice: random.Random) -> list[str]:
     line = [name]
     if dice.random() < 0.03:
         line = [dice.choice(("", "-", "--help", "solv", "SOLVE", *STRANGE))]
-    chosen = {option: value for option, value in CHUTE.items() if option in options and dice.random() < 0.98}
+    chosen: dict[str, str | None] = {}
+    chosen |= {option: value for option, value in CHUTE.items() if option in options and dice.random() < 0.98}
     if "--flux" in options and dice.random() < 0.8:
         chosen["--flux"] = "3"
     for option in dice.sample(list(options), min(dice.randrange(4), len(options))):
