@@ -20,18 +20,11 @@ from threading import RLock, Thread
 from typing import Any, ParamSpec, TypeVar
 
 from chuteflow.errors import ChuteflowError
+from chuteflow.threads import VARIABLES
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-#: What the libraries of linear algebra read when they are loaded: the workers are the threads.
-_ONE_THREAD = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "BLIS_NUM_THREADS",
-)
 # The environment is that of all threads.
 _environment = RLock()
 #: The exit code of a worker that was about to run the script of its parent once more.
@@ -194,8 +187,8 @@ def _script_that_is_a_file() -> Iterator[None]:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    before = {name: os.environ.get(name) for name in VARIABLES}
+    os.environ.update(dict.fromkeys(VARIABLES, "1"))
     try:
         yield
     finally:

@@ -12,7 +12,7 @@ from multiprocessing import current_process
 import click
 import pytest
 
-from chuteflow import processes
+from chuteflow import processes, threads
 from chuteflow.faces import interrupts
 from chuteflow.faces.cli import main
 from chuteflow.faces.commands import hot
@@ -238,7 +238,7 @@ def test_the_commands_start_as_many_workers(monkeypatch, tmp_path):
 
 
 def environment():
-    return {name: os.environ.get(name) for name in processes._ONE_THREAD}, signal.getsignal(signal.SIGINT)
+    return {name: os.environ.get(name) for name in threads.VARIABLES}, signal.getsignal(signal.SIGINT)
 
 
 def test_workers_have_one_thread_and_leave_interrupts_to_their_parent():

@@ -9,9 +9,10 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -19,6 +20,7 @@ from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.faces import interrupts
 from chuteflow.faces.commands import COMMANDS
+from chuteflow.threads import limit_process
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -75,15 +77,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from chuteflow.processes import require_main_guard
 
         require_main_guard()
+    if arguments is None:
+        limit_process()
+    _prepare_streams()
     with interrupts.Interrupts():
         return _run(arguments)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            # A terminal that knows no Greek still gets its answer.
-            stream.reconfigure(errors="backslashreplace")
     try:
         with interrupts.nothing_but_interrupts():
             code = chuteflow.main(arguments, prog_name="chuteflow", standalone_mode=False)
@@ -102,14 +103,44 @@ def _run(arguments: Sequence[str] | None) -> int:
             # A line of progress may stand there.
             click.echo("\r\x1b[K", nl=False, err=True)
         return _complain(str(error) or "interrupted", interrupts.INTERRUPTED)
+    except SystemExit:
+        # This is how click ends where whoever read has gone.
+        _abandon(sys.stdout)
+        return FAILED
     except BrokenPipeError:
-        # Whoever read has gone; what is left in the buffer must not fail once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _abandon(sys.stdout)
         return FAILED
     except OSError as error:
+        _abandon(sys.stdout)
         return _complain(f"cannot write the output: {error.strerror or error}", FAILED)
+    except MemoryError:
+        return _complain("out of memory: ask for less, such as fewer points, or give it more", FAILED)
+    except RecursionError:
+        return _complain("the input is nested too deeply", BAD_INPUT)
+
+
+def _prepare_streams() -> None:
+    """Make sure of both streams: one that is closed takes everything, and one that knows no Greek its escapes."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # It also keeps files opened later from the number of the closed stream.
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        stream = getattr(sys, name)
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _abandon(stream: TextIO) -> None:
+    """Let what is left in the buffer of ``stream`` go to nowhere, so that it does not fail once more at exit."""
+    with suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def _complain(message: str, code: int) -> int:
-    click.echo("chuteflow: " + " ".join(message.split()), err=True)
+    try:
+        click.echo("chuteflow: " + " ".join(message.split()), err=True)
+    except OSError:
+        _abandon(sys.stderr)
     return code

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from chuteflow.analysis.results import KINDS, Curve, FlowSet
 from chuteflow.faces import words
 from chuteflow.faces.contract import PLACE, factor
 from chuteflow.faces.tables import number
-from chuteflow.faces.writing import require_writable, written_beside
+from chuteflow.faces.writing import require_writable, write_whole
 from chuteflow.paper import style
 from chuteflow.paper.branches import runs
 from chuteflow.steady.chute import Chute
@@ -49,6 +50,7 @@ _MARKERS = {
 _RESOLUTION = 300
 
 
+@style.own_settings()
 def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     """Profiles of volume fraction, temperature and velocity, each flow with its own colour and dashes.
 
@@ -77,6 +79,7 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     return figure
 
 
+@style.own_settings()
 def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
     """Centre of mass, hold-up and flux against one another along every branch, special points marked.
 
@@ -110,8 +113,10 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     suffix = require_writable(path, SUFFIXES)
     # Pictures of one result are the same bytes, whenever they are drawn.
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(suffix, {})
-    with written_beside(path) as partial:
-        figure.savefig(partial, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    stream = BytesIO()
+    with style.own_settings():
+        figure.savefig(stream, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    write_whole(path, stream.getvalue())
 
 
 def _none(chute: Chute, reason: str | None) -> Figure:

@@ -9,17 +9,23 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.solver import Solution, in_parts
+from chuteflow.theory.constitutive import Law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
 #: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
 _SAMPLES = 96
+#: Heights of a profile at most.
+_MOST_POINTS = 1_000_000
+#: Far above the base, what falls off exponentially becomes zero.
+_vanishing = np.errstate(under="ignore")
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -99,6 +105,11 @@ class Flow:
     def surface_temperature(self) -> float:
         """T far above (half-line) or at the interface."""
         return self._macroscopic(LOG_T)
+
+    @property
+    def law(self) -> Law:
+        """The constitutive law that it was solved with, whatever is registered under its name now."""
+        return self._model.law
 
     @property
     def error(self) -> float:
@@ -195,7 +206,7 @@ class Flow:
         Raises:
             InputError: for a height below the base or above the interface.
         """
-        z = np.asarray(z, dtype=float)
+        z = real_array("z", z)
         flat = z.ravel()
         highest = self.interface_height
         if flat.size and not (np.isfinite(flat).all() and flat.min() >= 0.0 and flat.max() <= highest * (1 + 1e-12)):
@@ -209,14 +220,15 @@ class Flow:
         Raises:
             InputError: for a share out of range.
         """
-        share = np.asarray(share, dtype=float)
+        share = real_array("share", share)
         if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
             raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
         return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
         """All fields at ``points`` heights, spaced evenly from the base to ``top``, by default the depth."""
-        return self.profile(np.linspace(0.0, self.depth if top is None else top, points))
+        points = whole("points", points, 1, _MOST_POINTS)
+        return self.profile(np.linspace(0.0, self.depth if top is None else number("top", top), points))
 
     @property
     def _model(self) -> Model:
@@ -229,6 +241,7 @@ class Flow:
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
@@ -303,6 +316,7 @@ class Flow:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
+    @_vanishing
     def _shares_at(self, z: Array) -> Array:
         """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
@@ -321,6 +335,7 @@ class Flow:
                 break
         return np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
 
+    @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         at, f = self._at_share(share)
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
@@ -355,6 +370,7 @@ def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
     return flows
 
 
+@_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem

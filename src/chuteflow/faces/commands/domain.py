@@ -14,6 +14,8 @@ from chuteflow.faces.commands import COMMANDS
 from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.domains import Domain
     from chuteflow.steady.chute import Chute
 
@@ -85,22 +87,25 @@ def command(**given: Any) -> None:
         found = domain(chute, x, y, workers=workers, progress=_progress, **chosen, **options.search(given))
     finally:
         _clear()
-    if given["save"]:
-        from chuteflow.faces.files import save
-
-        save(found, given["save"])
-    if given["plot"]:
-        from chuteflow.faces.domain_plot import plot_domain
-        from chuteflow.faces.plots import write_figure
-
-        write_figure(plot_domain(found), given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
         from chuteflow.faces.domain_records import domain_object
 
-        click.echo(contract.text(domain_object(found)))
+        answer = contract.text(domain_object(found))
     else:
-        click.echo("\n".join(_report(found)))
+        answer = "\n".join(_report(found))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import files
+
+        files.save(found, path)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.domain_plot import plot_domain
+
+        return plot_domain(found)
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:

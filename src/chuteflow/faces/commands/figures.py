@@ -57,7 +57,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     chosen = only or list(FIGURES)
     names = {number: folder / f"figure_{number:02d}.{kind or 'png'}" for number in chosen}
     from chuteflow.faces.plots import write_figure
-    from chuteflow.faces.writing import require_writable, written_beside
+    from chuteflow.faces.writing import require_writable, write_whole
     from chuteflow.paper.data import csv_text
     from chuteflow.paper.sources import source
 
@@ -71,8 +71,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
             click.echo(f"figure {number} ...", nl=False, err=True)
         data = computed(number, flows)
         write_figure(drawn(number, data), path)
-        with written_beside(path.with_suffix(".csv")) as partial:
-            partial.write_text(csv_text(data, method_note(number, flows)), encoding="utf-8")
+        write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))
         unchanged = (
             f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
         )

@@ -31,7 +31,7 @@ _NAME = "index.html"
 def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool) -> None:
     """Compute all, and write the page at the end, whole or not at all."""
     path = directory(out or ".") / _NAME
-    from chuteflow.faces.writing import require_writable, written_beside
+    from chuteflow.faces.writing import require_writable, write_whole
 
     require_writable(path, (".html",))
     started, begin = datetime.now().astimezone(), time.perf_counter()
@@ -42,8 +42,7 @@ def command(out: str | None, method: str | None, only: list[int] | None, no_clai
     figures = [_drawn(number, flows) for number in only or FIGURES]
     verdicts = [] if no_claims else _checked()
     report = Report(figures, verdicts, flows.words, started, time.perf_counter() - begin)
-    with written_beside(path) as partial:
-        partial.write_text(page(report), encoding="utf-8")
+    write_whole(path, page(report))
     click.echo(f"{path}: {len(figures)} figures, {len(verdicts)} claims, {report.seconds:.0f} s")
 
 
