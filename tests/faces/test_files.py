@@ -2,7 +2,6 @@
 
 import csv
 import json
-from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -174,10 +173,10 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     save(RESULTS["flow"], path)
     before = path.read_bytes()
 
-    def full(self, *args, **kwargs):
+    def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr("os.fsync", full)
     with pytest.raises(InputError, match="No space left on device"):
         save(RESULTS["flows"], path)
     assert path.read_bytes() == before

@@ -1,8 +1,13 @@
 """What pictures show, by the numbers in them."""
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
+from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -68,6 +73,42 @@ def test_nothing_to_draw_is_drawn_with_its_reason(tmp_path):
     write_figure(plot_flows(flows(nothing, Q=3.0)), tmp_path / "a.png")
     write_figure(plot_curve(curve(nothing)), tmp_path / "b.svg")
     assert {p.name for p in tmp_path.iterdir()} == {"a.png", "b.svg"}
+
+
+SETTINGS: dict[Any, Any] = {
+    "text.usetex": True,
+    "font.family": "no such font",
+    "figure.autolayout": True,
+    "axes.grid": True,
+    "lines.linewidth": 9.0,
+    "svg.fonttype": "none",
+    "savefig.bbox": "tight",
+    "axes.formatter.use_mathtext": True,
+}
+
+
+def test_settings_of_the_user_change_nothing(tmp_path):
+    found = curve(PAPER, points=20)
+
+    def drawn(name):
+        write_figure(plot_curve(found), tmp_path / f"{name}.svg")
+        return (tmp_path / f"{name}.svg").read_bytes()
+
+    plain = drawn("plain")
+    with matplotlib.rc_context(SETTINGS):
+        assert drawn("set") == plain
+        assert matplotlib.rcParams["text.usetex"]
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "no such backend"])
+def test_any_backend_is_as_good(backend, tmp_path):
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nbackend: TkAgg\n")
+    command = [sys.executable, "-m", "chuteflow", "solve", "--slope", "0.3", "--e", "0.8", "--ew", "0.8"]
+    command += ["--roughness", "0.6", "--flux", "3", "--plot", "a.svg"]
+    environment = dict(os.environ) | {"MPLBACKEND": backend}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "a.svg").stat().st_size > 5000
 
 
 def test_an_unknown_format_is_refused(tmp_path):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow import display
+from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.constitutive import Field
@@ -199,11 +200,12 @@ def shoot(lambda_: float, mu: float = 0.0, s: ArrayLike | None = None, tolerance
         InputError: for a lambda without hot flow, or ``s`` or ``tolerance`` out of range.
         SolveError: where the base is not reached, for lambda near 3.
     """
-    if not (math.isfinite(lambda_) and lambda_ < LAMBDA_C and lambda_ != 0.0):
+    lambda_, mu, tolerance = number("lambda", lambda_), number("mu", mu), number("tolerance", tolerance)
+    if not (lambda_ < LAMBDA_C and lambda_ != 0.0):
         raise InputError(f"lambda = {lambda_}: hot flows have a lambda below 3, other than 0")
     if not 1e-13 <= tolerance <= 1e-3:
         raise InputError(f"tolerance = {tolerance}: must be from 1e-13 to 1e-3")
-    s = np.linspace(0.005, 1.0, 200) if s is None else np.asarray(s, dtype=float)
+    s = np.linspace(0.005, 1.0, 200) if s is None else real_array("s", s)
     if not (s.size and s.min() > 0.0 and s.max() <= 1.0):
         raise InputError("s must be above 0 and at most 1")
     fine = _Trajectory.to_base(lambda_, _START, tolerance)

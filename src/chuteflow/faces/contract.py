@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NoReturn
 
 from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched
+from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
@@ -100,6 +101,30 @@ def text(obj: Any) -> str:
         ValueError: for a number that is not finite.
     """
     return json.dumps(obj, allow_nan=False)
+
+
+def parsed(text: str | bytes) -> Any:
+    """The value of a JSON text, in UTF-8 with or without a byte-order mark.
+
+    Raises:
+        ValueError: for what is no JSON, a number that is not finite, or a name that an object has twice.
+        RecursionError: for too many brackets in one another.
+    """
+    if isinstance(text, bytes):
+        text = text.decode("utf-8-sig")
+    return json.loads(text, object_pairs_hook=_without_doubles, parse_constant=_not_finite)
+
+
+def _without_doubles(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise InputError(f"{next(name for name in names if names.count(name) > 1)[:40]!r} is in it twice")
+    return found
+
+
+def _not_finite(word: str) -> NoReturn:
+    raise InputError(f"{word} is in it: numbers must be finite")
 
 
 def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[str, float | str | None]:

@@ -59,6 +59,7 @@ _RASTER = 160
 _LINE = 1.1
 
 
+@style.own_settings()
 def plot_domain(found: Domain) -> Figure:
     """Two panels: how many flows share one flux, with the bounds of hot flows and hidden families hatched; and the
     kinds of density and interior, with the bounds of flows at the temperatures asked for."""

@@ -27,6 +27,7 @@ _MAP_OF_COLOURS = "RdBu_r"
 _NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
 
 
+@style.own_settings()
 def plot_wave_map(found: WaveMap) -> Figure:
     """Growth over wavenumbers along and across the slope."""
     figure, (ax,) = style.panels(1, width=5.2, height=4.2)
@@ -48,6 +49,7 @@ def plot_wave_map(found: WaveMap) -> Figure:
     return figure
 
 
+@style.own_settings()
 def plot_family_map(found: FamilyMap) -> Figure:
     """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)

@@ -6,19 +6,23 @@ holds the unknowns, those of all flows one after the other.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5netcdf
+import h5py
 import numpy as np
 
 from chuteflow import __version__
 from chuteflow.analysis.results import KINDS, Curve
-from chuteflow.faces import records
-from chuteflow.faces.contract import factor
+from chuteflow.checks import whole
+from chuteflow.errors import InputError
+from chuteflow.faces import contract, records
+from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
 from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity, Scales
@@ -28,13 +32,16 @@ from chuteflow.steady.validity import WORDS
 _INTERIORS = ("dissipative", "mixed", "productive")
 _DENSITIES = ("monotonic", "inverted")
 _STATUS = tuple(Status)
+#: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
+_LARGEST = 50_000_000
+_INTEGERS = ("unknowns", "status", "branch", "special")
 _PER_FLOW = {"degree": "i4", "stretch": "f8", "error": "f8"}
 
 
-def write(result: Result, path: Path, scales: Scales | None) -> None:
-    """Write ``result`` to ``path``."""
+def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
+    """Write ``result`` to ``stream``, in memory: HDF5 may end the process where a disk is full."""
     found = records.rows(result)
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(stream, "w") as file:
         file.dimensions = {"flow": len(found), "height_index": HEIGHTS}
         file.attrs.update(_attributes(result, scales))
         _write_numbers(file, found, scales)
@@ -53,27 +60,47 @@ def read(path: Path) -> Result:
         InputError: for a later or unknown format.
         OSError, ValueError, KeyError, TypeError: for a file that is not of this format.
     """
-    with h5netcdf.File(path, "r") as file:
-        group = file.groups["restore"]
-        head = json.loads(group.attrs["head"])
-        records.require_format(head)
-        columns = {name: variable[...] for name, variable in group.variables.items()}
-    chute = records.chute_from(head["chute"])
-    ends = np.cumsum(columns["unknowns"])
-    kinds = ("", *KINDS)
-    found = [
-        records.row_from(
-            chute,
-            {name: columns[name][i] for name in (*_PER_FLOW, "macroscopic", "branch")}
-            | {
-                "z": columns["z"][end - columns["unknowns"][i] : end],
-                "status": _STATUS[columns["status"][i]].name,
-                "special": kinds[columns["special"][i]],
-            },
-        )
-        for i, end in enumerate(ends)
-    ]
-    return records.rebuilt(head, found)
+    with restored_group(path) as group:
+        head = contract.parsed(group.attrs["head"])
+        columns = {name: group[name][...].tolist() for name in (*_PER_FLOW, *_INTEGERS, "z", "macroscopic")}
+    return records.restored(head, list(_rows(columns)))
+
+
+@contextmanager
+def restored_group(path: Path) -> Iterator[Any]:
+    """The group of a file that restores its result, once it is sure that it is not larger than any result.
+
+    It is read without h5netcdf, which leaves what it has of a damaged file to complain when it is collected.
+
+    Raises:
+        InputError: where a variable is too large: a file can claim any size.
+        OSError, KeyError: for a file that is damaged.
+    """
+    with h5py.File(path, "r") as file:
+        group: Any = file["restore"]
+        for name in group:
+            size = math.prod(group[name].shape)
+            if size > _LARGEST:
+                raise InputError(f"{name} claims {size} numbers")
+        yield group
+
+
+def _rows(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
+    """The values of each flow, as :func:`records.unknowns` gives them."""
+    lengths = [whole("the number of unknowns", length, 0) for length in columns["unknowns"]]
+    if sum(lengths) != len(columns["z"]):
+        raise InputError("a flow has the wrong number of unknowns")
+    statuses, kinds = [status.name for status in _STATUS], ("", *KINDS)
+    end = 0
+    for i, length in enumerate(lengths):
+        end += length
+        yield {name: columns[name][i] for name in ("degree", "stretch", "branch")} | {
+            "z": columns["z"][end - length : end],
+            "macroscopic": [finite(value) for value in columns["macroscopic"][i]],
+            "error": None if columns["error"][i] == math.inf else columns["error"][i],
+            "status": statuses[whole("status", columns["status"][i], 0, len(statuses) - 1)],
+            "special": kinds[whole("special", columns["special"][i], 0, len(kinds) - 1)],
+        }
 
 
 def _attributes(result: Result, scales: Scales | None) -> dict[str, Any]:
@@ -168,7 +195,7 @@ def _write_profiles(file: h5netcdf.File, found: Sequence[Row], scales: Scales | 
 def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row]) -> None:
     solutions = [row.flow.solution for row in found]
     group.attrs["long_name"] = "discretised unknowns, from which chuteflow rebuilds the flows to the last bit"
-    group.attrs["head"] = json.dumps(records.head(result), allow_nan=False)
+    group.attrs["head"] = contract.text(records.head(result, found))
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -10,6 +10,8 @@ import click
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
@@ -223,14 +225,40 @@ def search(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in arguments.items() if value is not None}
 
 
-def require_outputs(given: Mapping[str, Any]) -> None:
-    """Check before anything is computed that --save and --plot can be written.
+def deliver(given: Mapping[str, Any], answer: str, save: Callable[[str], None], plot: Callable[[], Figure]) -> None:
+    """Write the files that --save and --plot name, and print the answer, which no full disk is to cost.
+
+    Raises:
+        InputError: once the answer is printed, for files that could not be written.
+    """
+
+    def draw(path: str) -> None:
+        from chuteflow.faces.plots import write_figure
+        from chuteflow.paper import style
+
+        with style.own_settings():
+            write_figure(plot(), path)
+
+    failures = []
+    for name, write in (("save", save), ("plot", draw)):
+        if given[name] is not None:
+            try:
+                write(given[name])
+            except InputError as error:
+                failures.append(str(error))
+    click.echo(answer)
+    if failures:
+        raise InputError("; ".join(failures))
+
+
+def require_outputs(given: Mapping[str, Any], saved: Sequence[str] = SAVED) -> None:
+    """Check before anything is computed that --save, with an ending of ``saved``, and --plot can be written.
 
     Raises:
         InputError: for a file that cannot.
     """
     from chuteflow.faces.writing import require_writable
 
-    for name, suffixes in (("save", SAVED), ("plot", DRAWN)):
+    for name, suffixes in (("save", saved), ("plot", DRAWN)):
         if given[name] is not None:
             require_writable(given[name], suffixes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from chuteflow.analysis.results import KINDS, Branch, Curve, FlowSet
 from chuteflow.faces import words
 from chuteflow.faces.contract import PLACE, factor
 from chuteflow.faces.tables import number
-from chuteflow.faces.writing import require_writable, written_beside
+from chuteflow.faces.writing import require_writable, write_whole
 from chuteflow.paper import style
 from chuteflow.paper.branches import in_order, runs, smooth
 from chuteflow.steady.chute import Chute
@@ -52,6 +53,7 @@ _HALOS = {"packed: beyond the theory": "#adadad", "dense: beyond the theory": "#
 _RESOLUTION = 300
 
 
+@style.own_settings()
 def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     """Profiles of volume fraction, temperature and velocity, each flow with its own colour and dashes.
 
@@ -80,6 +82,7 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     return figure
 
 
+@style.own_settings()
 def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
     """Centre of mass, hold-up and flux against one another along every branch, special points marked.
 
@@ -115,8 +118,10 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     suffix = require_writable(path, SUFFIXES)
     # Pictures of one result are the same bytes, whenever they are drawn.
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(suffix, {})
-    with written_beside(path) as partial:
-        figure.savefig(partial, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    stream = BytesIO()
+    with style.own_settings():
+        figure.savefig(stream, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    write_whole(path, stream.getvalue())
 
 
 def _none(chute: Chute, reason: str | None) -> Figure:

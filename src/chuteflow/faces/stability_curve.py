@@ -37,6 +37,7 @@ _WORDS = {
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"))
 
 
+@style.own_settings()
 def plot_marked(marked: MarkedCurve, *, scales: Scales | None = None) -> Figure:
     """Centre of mass and hold-up against flux: solid where flows are stable, dashed where not."""
     curve = marked.curve

@@ -1,13 +1,17 @@
 """The look of all figures: strokes that differ in print and for the colour-blind, panels and labels.
 
-matplotlib is imported when a figure is made, through its objects alone: nothing global is set.
+matplotlib is imported when a figure is made, through its objects alone. Figures have the settings of this module
+and matplotlib's defaults: neither a user's matplotlibrc nor a backend for windows or notebooks has a say.
 """
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +68,35 @@ STROKES = (
     Stroke(BLACK, SOLID),
     Stroke(GREY, DASHED),
 )
+
+
+@contextmanager
+def own_settings() -> Iterator[None]:
+    """matplotlib's defaults while a figure is made or written, whatever the settings are before and after.
+
+    It decorates functions too. Settings may ask for programs that are not there, such as LaTeX.
+    """
+    _import_matplotlib()
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams["svg.hashsalt"] = "chuteflow"  # the same names inside, whenever a picture is drawn
+        yield
+
+
+def _import_matplotlib() -> None:
+    """Import matplotlib where the environment names a backend that is not there, which would be an error."""
+    backend = os.environ.get("MPLBACKEND")
+    if "matplotlib" in sys.modules or backend is None:
+        return
+    os.environ["MPLBACKEND"] = "agg"
+    try:
+        import matplotlib
+    finally:
+        os.environ["MPLBACKEND"] = backend
+    with suppress(ValueError):
+        matplotlib.rcParams["backend"] = backend
 
 
 def stroke(index: int) -> Stroke:

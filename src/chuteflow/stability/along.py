@@ -11,9 +11,11 @@ import numpy as np
 from chuteflow import display
 from chuteflow.analysis.crossings import Chord
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
-from chuteflow.errors import InputError, SolveError
+from chuteflow.checks import whole
+from chuteflow.errors import SolveError
 from chuteflow.stability.verdict import Stability, stability_of
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
@@ -84,6 +86,8 @@ class MarkedCurve:
         return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 
@@ -96,8 +100,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
     """
-    if not 2 <= samples <= _MOST_SAMPLES:
-        raise InputError(f"samples = {samples}: must be from 2 to {_MOST_SAMPLES}")
+    samples = whole("samples", samples, 2, _MOST_SAMPLES)
     found = []
     for i, branch in enumerate(curve.branches):
 

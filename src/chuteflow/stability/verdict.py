@@ -20,6 +20,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import refined
 from chuteflow.stability.modes import DEGREES, TOLERANCE, Disturbances, Mode, check_wavenumbers
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Range of k h that is searched; the shortest waves are two grains long, or as long as the flow is deep.
 RANGE, _SHORTEST = (1e-3, 10.0), np.pi
@@ -65,6 +66,8 @@ class Stability:
         return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None) -> Stability:
     """Whether ``flow`` is stable, from a search over wavenumbers.
 
@@ -98,6 +101,8 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
     return RANGE[0] / h, min(RANGE[1], max(_SHORTEST * h, 1.0)) / h
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
     """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
 
@@ -303,6 +308,8 @@ class GrowthMap:
     error: Array
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def growth_map(disturbances: Disturbances, kx: Array, ky: Array) -> GrowthMap:
     """The leading mode at each pair of wavenumbers, about 40 ms for each.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow import display
+from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
 from chuteflow.steady.chute import Chute
@@ -19,6 +20,7 @@ from chuteflow.steady.names import name_of
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution, in_parts
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
+from chuteflow.theory.constitutive import Law
 from chuteflow.theory.laws import law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
@@ -27,6 +29,10 @@ CUTOFF = 0.01
 _SAMPLES = 96
 #: The density is taken to rise or fall where p dtheta/dp differs by so much from 1.
 _LEVEL = 1e-8
+#: Heights of a profile at most.
+_MOST_POINTS = 1_000_000
+#: Far above the base, what falls off exponentially becomes zero.
+_vanishing = np.errstate(under="ignore")
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -130,6 +136,11 @@ class Flow:
     def surface_temperature(self) -> float:
         """T far above (half-line) or at the interface."""
         return self._macroscopic(LOG_T)
+
+    @property
+    def law(self) -> Law:
+        """The constitutive law that it was solved with, whatever is registered under its name now."""
+        return self._model.law
 
     @property
     def error(self) -> float:
@@ -251,7 +262,7 @@ class Flow:
         Raises:
             InputError: for a height below the base or above the interface.
         """
-        z = np.asarray(z, dtype=float)
+        z = real_array("z", z)
         flat = z.ravel()
         highest = self.interface_height
         if flat.size and not (np.isfinite(flat).all() and flat.min() >= 0.0 and flat.max() <= highest * (1 + 1e-12)):
@@ -265,14 +276,15 @@ class Flow:
         Raises:
             InputError: for a share out of range.
         """
-        share = np.asarray(share, dtype=float)
+        share = real_array("share", share)
         if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
             raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
         return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
         """All fields at ``points`` heights, spaced evenly from the base to ``top``, by default the depth."""
-        return self.profile(np.linspace(0.0, self.depth if top is None else top, points))
+        points = whole("points", points, 1, _MOST_POINTS)
+        return self.profile(np.linspace(0.0, self.depth if top is None else number("top", top), points))
 
     @property
     def _model(self) -> Model:
@@ -285,6 +297,7 @@ class Flow:
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
@@ -366,6 +379,7 @@ class Flow:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
+    @_vanishing
     def _shares_at(self, z: Array) -> Array:
         """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
@@ -384,6 +398,7 @@ class Flow:
                 break
         return np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
 
+    @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         at, f = self._at_share(share)
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
@@ -418,6 +433,7 @@ def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
     return flows
 
 
+@_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem

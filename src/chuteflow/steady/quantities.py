@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from chuteflow.checks import number
 from chuteflow.errors import InputError
 
 
@@ -208,9 +209,10 @@ class Scales:
 
     def __post_init__(self) -> None:
         for name in ("diameter", "density", "gravity"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
+            value = number(name, getattr(self, name))
+            if value <= 0.0:
                 raise InputError(f"{name} = {value}: must be a positive number")
+            object.__setattr__(self, name, value)
 
     def factor(self, name: str, slope: float) -> float:
         """What the dimensionless quantity ``name`` on a chute of ``slope`` is multiplied with for SI units.

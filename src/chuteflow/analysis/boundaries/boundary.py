@@ -18,6 +18,7 @@ from chuteflow.analysis.boundaries.tracing import CONTROL, TracedBoundary, trace
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
 from chuteflow.analysis.tracing import TracedFamily
+from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control
@@ -26,6 +27,7 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import PARAMETERS
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
+from chuteflow.threads import on_one_thread
 
 #: What can be followed.
 KINDS = seeds.KINDS
@@ -172,6 +174,8 @@ class BoundarySet(Sequence[Boundary]):
         return iter(self.boundaries)
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def boundary(
     chute: Chute,
     *,
@@ -205,9 +209,8 @@ def boundary(
         SolveError: where a boundary could not be followed or a point not solved to the tolerance.
     """
     sweep = _checked(chute, of, second, bounds)
-    if not 2 <= samples <= 1000:
-        raise InputError(f"samples = {samples}: must be from 2 to 1000")
-    checked_tolerance(tolerance)
+    samples = whole("samples", samples, 2, 1000)
+    tolerance = checked_tolerance(tolerance)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
@@ -260,9 +263,9 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
         raise InputError(f"cannot follow {of!r}: choose one of {', '.join(KINDS)}")
     if second not in PARAMETERS:
         raise InputError(f"unknown second parameter {second!r}: choose one of {', '.join(PARAMETERS)}")
-    low, high = bounds
-    sweep = Sweep(chute, second, float(low), float(high))
-    for value in bounds:
+    low, high = pair("bounds", bounds)
+    sweep = Sweep(chute, second, low, high)
+    for value in (low, high):
         sweep.chute_at(value)  # which says what is allowed
     if not low < high:
         raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")

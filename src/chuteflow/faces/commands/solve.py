@@ -11,6 +11,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.steady.quantities import Scales
 
@@ -50,20 +52,24 @@ def command(**given: Any) -> None:
     from chuteflow.analysis.enumeration import flows
 
     found = flows(chute, **condition, **options.search(given))
-    if given["save"]:
-        from chuteflow.faces.files import save
-
-        save(found, given["save"], scales=scales)
-    if given["plot"]:
-        from chuteflow.faces.plots import plot_flows, write_figure
-
-        write_figure(plot_flows(found, scales=scales), given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
 
-        click.echo(contract.text(contract.flow_set_object(found, scales)))
+        answer = contract.text(contract.flow_set_object(found, scales))
     else:
-        click.echo("\n".join(_report(found, scales)))
+        answer = "\n".join(_report(found, scales))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import files
+
+        files.save(found, path, scales=scales)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.plots import plot_flows
+
+        return plot_flows(found, scales=scales)
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
