@@ -43,7 +43,7 @@ def test_what_is_no_number_is_refused_in_one_line(value):
         lambda: Chute.at_angle(value, restitution=0.8, wall_restitution=0.8, roughness=0.6),
         lambda: Scales(value, 2500.0),
         lambda: Scales(1e-3, 2500.0, gravity=value),
-        lambda: flows(PAPER, M=value) if value is not None else Chute(0.3, value, 0.8, 0.6),
+        lambda: whole("points", value, 0) if value is None else flows(PAPER, M=value),
         lambda: flows(PAPER, Q=3.0, tolerance=value),
         lambda: flows(PAPER, Q=3.0, largest_holdup=value),
         lambda: flows(PAPER, Q=3.0, surface_temperature=(value, 1e3)),

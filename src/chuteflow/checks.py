@@ -22,10 +22,9 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
         InputError: naming ``name``, what was given and what is allowed.
     """
     found = real(name, value, _from_to(low, high))
-    if not math.isfinite(found):
-        raise InputError(f"{name} = {shown(value)}: must be a finite number{_from_to(low, high)}")
-    if not low <= found <= high:
-        raise InputError(f"{name} = {shown(value)}: must be{_from_to(low, high)}")
+    if not (math.isfinite(found) and low <= found <= high):
+        kind = "" if math.isfinite(found) or math.isfinite(high) else " a finite number"
+        raise InputError(f"{name} = {shown(value)}: must be{kind}{_from_to(low, high)}")
     return found
 
 
