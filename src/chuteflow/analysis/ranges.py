@@ -73,6 +73,30 @@ class Range:
         upper = self.hottest if axis == LOG_T else self.deepest
         return int(macroscopic[axis] > np.log(upper) - _NEAR)
 
+    def at_edge(self, macroscopic: Array, near: float) -> tuple[int, float] | None:
+        """The edge at which a flow lies to within ``near``: LOG_T or LOG_M, and its value there."""
+        edges = [(LOG_M, self.deepest), (LOG_T, self.hottest), (LOG_T, self.coldest)]
+        if self.shallowest > 0.0:
+            edges.append((LOG_M, self.shallowest))
+        for axis, value in edges:
+            if abs(float(macroscopic[axis]) - np.log(value)) < near:
+                return axis, float(np.log(value))
+        return None
+
+    def end_words(self, macroscopic: Array) -> str:
+        """Why a branch ends at a flow."""
+        edge = self.at_edge(macroscopic, _NEAR)
+        if edge is None:
+            return "the search was not carried further"
+        axis, value = edge
+        if axis == LOG_M:
+            if value == np.log(self.deepest):
+                return f"it goes on to hold-ups above {self.deepest:g}"
+            return "its hold-up vanishes"
+        if value == np.log(self.hottest):
+            return f"it goes on to surface temperatures above {self.hottest:g}"
+        return f"it goes on to surface temperatures below {self.coldest:g}"
+
     def passed(self, macroscopic: Array) -> tuple[int, float, str]:
         """Which edge a flow outside has passed: LOG_T or LOG_M, its value there, and in words."""
         if macroscopic[LOG_M] > np.log(self.deepest):
