@@ -1,34 +1,35 @@
-"""Where a quantity takes a value along a family of flows: brackets, turns, and the flows themselves.
-
-# notation: sigma runs from 0 to 1 along the chord between two flows in the plane (ln M, ln T_surface).
-"""
+"""Where a quantity takes a value along a family of flows: brackets, turns, and the flows themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
+from chuteflow.analysis.chords import Chord
+from chuteflow.analysis.turns import Bracket, along, directions, expansions, find_zero, may_turn, turns
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.steady.collocation import LOG_M, Collocation
-from chuteflow.steady.solver import DEGREES, TOLERANCE, Condition, Solution, Status, between, resolve, solve, solve_many
+from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation
+from chuteflow.steady.solver import DEGREES, TOLERANCE, Condition, Solution, Status, resolve, solve, solve_many
 
-#: Where a rough quantity turns this near to the value sought, in the logarithm, the turn is located.
+#: Where a rough quantity may turn this near to the value sought, in the logarithm, its turns are located.
 NEAR = 0.02
-#: Knots to either side of a rough turn among which the turn is looked for.
-_ASIDE = 3
+#: Rough flows nearer than this tell no slope; a logarithm of theirs is known to this.
+_TOO_NEAR, _BLUR = 0.08, 2e-3
 #: A flow found from a bracket lies within this many of its lengths, and a little.
 _BESIDE, _ROUGH = 1.0, 0.1
 #: Flows whose ln M and ln T_surface differ by less are one flow.
 _SAME = 1e-7
+#: A flow solved at a fixed quantity is that of its bracket if it is so near to the one found along the branch.
+_AS_FOUND = 1e-6
+#: Least error of a logarithm ever claimed.
+_FLOOR = 1e-12
 #: Degrees on which a knot is tried in turn.
 _STARTS = (DEGREES[0], DEGREES[3], DEGREES[5])
-#: A chord is searched until sigma is known to this.
-_CLOSE = 1e-9
-#: Share of the slopes at the ends of a chord that is left at a turn.
-_FLAT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,52 +67,125 @@ class Knot:
         return cls(solution.macroscopic, lambda degree: (solution.problem, solution.z), solution)
 
 
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """Knots in order along a family; ``turns`` are those at which the quantity asked for turns."""
+
+    knots: list[Knot]
+    turns: list[Knot]
+
+
 def crossings(knots: Sequence[Knot], which: int, value: float, tolerance: float) -> Iterator[Solution]:
     """Flows of the family through ``knots`` at which the quantity ``which`` equals ``value``.
+
+    So near to a turn that rounding hides on which side of it the value lies, the flow at the turn is one of them, with
+    an error that says so.
 
     Raises:
         SolveError: where a flow that is bracketed could not be solved.
     """
     target = float(np.log(value))
-    condition = Condition.fix(which, value)
-    knots = _with_turns(knots, which, target)
-    off = np.array([knot.macroscopic[which] for knot in knots]) - target
-    brackets = [(knots[i], knots[i + 1]) for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))]
+    path = _with_turns(knots, which, target)
+    brackets = [
+        pair
+        for pair in pairwise(path.knots)
+        if (pair[0].macroscopic[which] >= target) != (pair[1].macroscopic[which] >= target)
+    ]
+    exact = [pair for pair in brackets if pair[0].exact is not None and pair[1].exact is not None]
+    rough = [pair for pair in brackets if pair[0].exact is None or pair[1].exact is None]
+    for turn in path.turns:
+        off = abs(float(turn.macroscopic[which]) - target)
+        assert turn.exact is not None
+        if off <= max(turn.exact.error, _FLOOR) and not any(turn in pair for pair in brackets):
+            yield _at_turn(turn.exact, path.knots, which, off)
+    yield from _from_rough(rough, which, value, tolerance)
+    for one, other in exact:
+        assert one.exact is not None and other.exact is not None
+        yield _on_stretch(one.exact, other.exact, which, value, tolerance)
+
+
+def _from_rough(
+    brackets: Sequence[tuple[Knot, Knot]], which: int, value: float, tolerance: float
+) -> Iterator[Solution]:
+    """The flows between rough knots: solved directly, where that surely gives the one and only flow of a bracket."""
+    target, condition = float(np.log(value)), Condition.fix(which, value)
     nearer = [min(pair, key=lambda knot: abs(knot.macroscopic[which] - target)) for pair in brackets]
     direct = solve_many([knot.start(_STARTS[0]) for knot in nearer], [condition] * len(nearer), tolerance)
     for i, (pair, knot, found) in enumerate(zip(brackets, nearer, direct, strict=True)):
         solution = found if found.converged else knot.solved(condition, tolerance)
-        # Beside a turn, which is exact, either of two flows may be found: only the bracket tells them apart.
-        turning = pair[0].exact is not None and pair[1].exact is not None
+        # Of the flows of two brackets that are one flow, one at least has strayed.
         contested = any(_same(found, other) for j, other in enumerate(direct) if j != i)
-        if turning or contested or not _is_between(*pair, solution):
-            solution = _bracketed(*pair, which, target, condition, solution, tolerance)
-        if solution is not None:
+        if contested or not _is_between(*pair, solution) or not _passes(*pair, which, solution):
+            yield from _bracketed(*pair, which, value, solution, tolerance)
+        else:
             yield solution
 
 
-def _with_turns(knots: Sequence[Knot], which: int, target: float) -> list[Knot]:
-    """The knots, with those near a turn near the target solved, and the turn itself put in between."""
-    off = np.array([knot.macroscopic[which] for knot in knots]) - target
-    if len(knots) < 3:
-        return list(knots)
-    turns = (off[1:-1] - off[:-2]) * (off[2:] - off[1:-1]) <= 0.0
-    bend = np.abs(off[:-2] - 2.0 * off[1:-1] + off[2:])
-    near = np.zeros(len(knots), dtype=bool)
-    for i in np.flatnonzero(turns & (np.abs(off[1:-1]) < NEAR + bend)).tolist():
-        # The roughness of the knots may put the turn a few of them beside its place.
-        near[max(i + 1 - _ASIDE, 0) : i + 2 + _ASIDE] = True
-    solved = [_solved(knots, i) if flag else None for i, flag in enumerate(near)]
+def _with_turns(knots: Sequence[Knot], which: int, target: float) -> _Path:
+    """The path of a family: where a quantity may turn near the target its knots are solved, and the turns put in."""
+    kept = _kept(knots)
+    wanted = _near_turns([knots[i] for i in kept], which, target)
     out: list[Knot] = []
+    found: list[Knot] = []
+    begin = 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(int))).tolist()
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        # Steps first to last-1 lie between the knots first to last.
+        out += knots[begin : kept[first]]
+        stretch = solved_path([knots[i] for i in kept[first : last + 1]])
+        turning = [(turn.place, Knot.at(turn.solution)) for turn in turns(stretch, (which,))]
+        found += [knot for _, knot in turning]
+        places = [*((float(i), Knot.at(solution)) for i, solution in enumerate(stretch)), *turning]
+        out += [knot for _, knot in sorted(places, key=lambda place: place[0])]
+        begin = kept[last] + 1
+    return _Path([*out, *knots[begin:]], found)
+
+
+def _kept(knots: Sequence[Knot]) -> list[int]:
+    """Knots with both ends, without rough ones too near to the one before."""
+    kept = [0]
+    for i in range(1, len(knots) - 1):
+        apart = min(np.hypot(*(knots[i].macroscopic - knots[j].macroscopic)[LOG_M:]) for j in (kept[-1], -1))
+        if knots[i].exact is not None or apart > _TOO_NEAR:
+            kept.append(i)
+    return [*kept, len(knots) - 1] if len(knots) > 1 else kept
+
+
+def _near_turns(knots: Sequence[Knot], which: int, target: float) -> NDArray[np.bool_]:
+    """The steps between knots in which a quantity may turn near the target, and those beside them."""
+    macroscopic = np.array([knot.macroscopic for knot in knots])
+    off = macroscopic[:, which] - target
+    if len(knots) < 2:
+        return np.zeros(0, dtype=bool)
+    gain, length = np.diff(off), np.maximum(np.hypot(*np.diff(macroscopic[:, LOG_M:], axis=0).T), 1e-12)
+    bend = np.concatenate([[0.0], np.abs(np.diff(gain)), [0.0]])
+    reach = NEAR + np.maximum(bend[1:], bend[:-1])
+    near = (np.minimum(off[1:], off[:-1]) < reach) & (np.maximum(off[1:], off[:-1]) > -reach)
+    wanted = near & may_turn(gain / length, _BLUR / length)
+    beside = np.concatenate([[False], wanted, [False]])
+    return wanted | beside[2:] | beside[:-2]
+
+
+def solved_path(knots: Sequence[Knot]) -> list[Solution]:
+    """The knots solved, each in the plane through it across the path; those that cannot be are left out."""
+    plane = np.array([knot.macroscopic[LOG_M:] for knot in knots])
+    ahead = directions(plane) if len(knots) > 1 else np.array([[1.0, 0.0]])
+    conditions = [Condition.plane(along, knot.macroscopic) for along, knot in zip(ahead, knots, strict=True)]
+    rough = [i for i, knot in enumerate(knots) if knot.exact is None]
+    together = solve_many([knots[i].start(_STARTS[0]) for i in rough], [conditions[i] for i in rough])
+    out: list[Solution] = []
+    found = dict(zip(rough, together, strict=True))
     for i, knot in enumerate(knots):
-        here = solved[i]
-        out.append(knot if here is None else Knot.at(here))
-        after = solved[i + 1] if i + 1 < len(knots) else None
-        if here is not None and after is not None:
-            turn = turning_point(here, after, which)
-            if turn is not None:
-                out.append(Knot.at(turn))
+        solution = knot.exact or found[i]
+        if knot.exact is None and not (solution.converged and _apart(solution, knot) <= _ROUGH):
+            solution = knot.solved(conditions[i])
+        if solution.converged:
+            out.append(solution)
     return out
+
+
+def _apart(solution: Solution, knot: Knot) -> float:
+    return float(np.hypot(*(solution.macroscopic - knot.macroscopic)[LOG_M:]))
 
 
 def solved(knots: Sequence[Knot], i: int) -> tuple[Solution, Array]:
@@ -123,92 +197,8 @@ def solved(knots: Sequence[Knot], i: int) -> tuple[Solution, Array]:
     return knots[i].solved(Condition.plane(ahead, knots[i].macroscopic)), ahead
 
 
-def _solved(knots: Sequence[Knot], i: int) -> Solution | None:
-    exact = knots[i].exact
-    if exact is not None:
-        return exact
-    solution, _ = solved(knots, i)
-    return solution if solution.converged else None
-
-
-class Chord:
-    """The stretch of a family between two solved flows, as a function of sigma."""
-
-    def __init__(self, first: Solution, last: Solution, tolerance: float = TOLERANCE) -> None:
-        chord = (last.macroscopic - first.macroscopic)[LOG_M:]
-        weights = chord / float(chord @ chord)
-        self._weights = (0.0, 0.0, float(weights[0]), float(weights[1]))
-        self._begin = float(weights @ first.macroscopic[LOG_M:])
-        self._known = [(0.0, first), (1.0, last)]
-        self._tolerance = tolerance
-
-    def at(self, sigma: float) -> Solution:
-        """The flow at ``sigma``.
-
-        Raises:
-            SolveError: where the solver does not converge.
-        """
-        solution = solve(*self.start_at(sigma), self.condition_at(sigma), self._tolerance)
-        if not solution.converged:
-            raise SolveError(f"a family of flows could not be followed: {solution.status.value}")
-        self._known.append((sigma, solution))
-        return solution
-
-    def condition_at(self, sigma: float) -> Condition:
-        """The plane at ``sigma`` normal to the chord."""
-        return Condition(self._weights, self._begin + sigma)
-
-    def start_at(self, sigma: float) -> tuple[Collocation, Array]:
-        """Where the solver may start from at ``sigma``: between the nearest flows known."""
-        (at, near), (other_at, other) = sorted(self._known, key=lambda known: abs(known[0] - sigma))[:2]
-        return between(near, other, (sigma - at) / (other_at - at))
-
-    def slope(self, solution: Solution, which: int) -> float:
-        """Derivative of the logarithm ``which`` with respect to sigma at a flow of the stretch."""
-        gradient = solution.state.macroscopic_gradient()
-        matrix = np.vstack([solution.state.jacobian(), np.array(self._weights) @ gradient])
-        side = np.zeros(len(matrix))
-        side[-1] = 1.0
-        return float(gradient[which] @ np.linalg.solve(matrix, side))
-
-    def zero(self, function: Callable[[Solution], float], ends: tuple[float, float]) -> Solution:
-        """The flow at which ``function`` vanishes, given its values of opposite sign at the ends.
-
-        Regula falsi with the Illinois rule, down to rounding of sigma.
-        """
-        (low, f_low), (high, f_high) = (0.0, ends[0]), (1.0, ends[1])
-        side = 0
-        solution = self._known[0][1]
-        for _ in range(100):
-            sigma = (low * f_high - high * f_low) / (f_high - f_low)
-            solution = self.at(sigma)
-            f = function(solution)
-            if f == 0.0 or high - low < _CLOSE or abs(f) < _CLOSE * abs(ends[1] - ends[0]):
-                return solution
-            if (f > 0.0) == (f_high > 0.0):
-                high, f_high = sigma, f
-                f_low = 0.5 * f_low if side == 1 else f_low
-                side = 1
-            else:
-                low, f_low = sigma, f
-                f_high = 0.5 * f_high if side == -1 else f_high
-                side = -1
-        return solution
-
-
-def turning_point(first: Solution, last: Solution, which: int, tolerance: float = TOLERANCE) -> Solution | None:
-    """The flow between two at which the quantity ``which`` turns, or None where it does not."""
-    chord = Chord(first, last, tolerance)
-    slopes = chord.slope(first, which), chord.slope(last, which)
-    if (slopes[0] > 0.0) == (slopes[1] > 0.0):
-        return None
-    turn = chord.zero(lambda solution: chord.slope(solution, which), slopes)
-    # Where the family runs across the chord the slope changes sign through infinity, or in a jump: that is no turn.
-    return turn if abs(chord.slope(turn, which)) <= _FLAT * max(map(abs, slopes)) else None
-
-
 def _same(one: Solution, other: Solution) -> bool:
-    """Whether two solutions are one flow: of those of two brackets, one at least has strayed."""
+    """Whether two solutions are one flow."""
     apart = np.abs(one.macroscopic - other.macroscopic)[LOG_M:].max()
     return one.converged and other.converged and bool(apart < _SAME)
 
@@ -223,19 +213,77 @@ def _is_between(a: Knot, b: Knot, solution: Solution) -> bool:
     return beside <= (0.5 + _BESIDE) * length + _ROUGH
 
 
+def _passes(a: Knot, b: Knot, which: int, solution: Solution) -> bool:
+    """Whether the quantity changes along the branch at a solution as it does from one knot to the other.
+
+    Where it does not, there are three flows or more between them.
+    """
+    chord = (b.macroscopic - a.macroscopic)[LOG_M:]
+    length = float(np.hypot(*chord))
+    if length == 0.0:
+        return False
+    (at,) = expansions([solution], chord[None] / length)
+    return bool((at.first[which] > 0.0) == (b.macroscopic[which] > a.macroscopic[which]))
+
+
 def _bracketed(
-    a: Knot, b: Knot, which: int, target: float, condition: Condition, direct: Solution, tolerance: float
-) -> Solution | None:
-    """The flow between two knots, by bracketing; where only the roughness of the knots put one there, the
+    a: Knot, b: Knot, which: int, value: float, direct: Solution, tolerance: float
+) -> Iterator[Solution]:
+    """The flows between two knots, by their exact turns; where only the roughness of the knots put one there, the
     solution ``direct``, if it is one."""
-    first, last = _solved([a, b], 0), _solved([a, b], 1)
-    if first is None or last is None:
+    ends = solved_path([a, b])
+    if len(ends) < 2:
         raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
-    ends = (float(first.macroscopic[which]) - target, float(last.macroscopic[which]) - target)
-    if (ends[0] >= 0.0) == (ends[1] >= 0.0):
-        return direct if direct.converged else None
-    near = Chord(first, last).zero(lambda s: float(s.macroscopic[which]) - target, ends)
-    solution = resolve(near, condition, tolerance)
-    if not solution.converged:
-        raise SolveError(f"a flow was bracketed but not solved: {solution.status.value}")
-    return solution
+    target = float(np.log(value))
+    stops = [ends[0], *(turn.solution for turn in turns(ends, (which,))), ends[1]]
+    found = [
+        _on_stretch(*pair, which, value, tolerance)
+        for pair in pairwise(stops)
+        if (pair[0].macroscopic[which] >= target) != (pair[1].macroscopic[which] >= target)
+    ]
+    if not found and direct.converged:
+        found = [direct]
+    yield from found
+
+
+def _on_stretch(first: Solution, last: Solution, which: int, value: float, tolerance: float) -> Solution:
+    """The one flow between two, between which a quantity does not turn, at which it has a value.
+
+    It is sought along the branch, and then solved at the given quantity. That fails next to a turn, where the flow
+    found along the branch is as good: its error counts what the quantity is off, or may be, by how far the flow moves.
+    """
+    target = float(np.log(value))
+    chord = Chord(first, last)
+    off = float(first.macroscopic[which]) - target, float(last.macroscopic[which]) - target
+
+    def excess(solution: Solution) -> tuple[float, float]:
+        return float(solution.macroscopic[which]) - target, float(along(chord, solution)[0][which])
+
+    found = find_zero(chord, excess, Bracket(0.0, 1.0, off[0] / (off[0] - off[1]), off[0]))
+    if found is None:
+        raise SolveError("a flow was bracketed but not solved: ask for a larger tolerance")
+    near = found[1]
+    solution = resolve(near, Condition.fix(which, value), tolerance)
+    if solution.converged and np.abs(solution.macroscopic - near.macroscopic)[LOG_M:].max() < _AS_FOUND:
+        return solution
+    return _with_error_of(near, chord, which, abs(float(near.macroscopic[which]) - target))
+
+
+def _at_turn(turn: Solution, knots: Sequence[Knot], which: int, off: float) -> Solution:
+    """The flow at a turn as one whose quantity is ``off`` by no more than rounding."""
+    i = next(i for i, knot in enumerate(knots) if knot.exact is turn)
+    beside = [knots[j].exact for j in (i - 1, i + 1)]
+    assert beside[0] is not None and beside[1] is not None
+    return _with_error_of(turn, Chord(beside[0], beside[1]), which, off)
+
+
+def _with_error_of(solution: Solution, chord: Chord, which: int, off: float) -> Solution:
+    """A flow of a chord, with the error that it has as one at a value of a quantity that is ``off``."""
+    first, second = along(chord, solution)
+    off = off + max(solution.error, _FLOOR)
+    slope, bend = abs(float(first[which])), abs(float(second[which]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Where m = m' d + m'' d^2/2 is off, so far is the flow at most.
+        far = float(np.fmin(2.0 * off / np.float64(slope), slope / np.float64(bend) + np.sqrt(2.0 * off / np.float64(bend))))
+    moved = float(np.abs(first[:LOG_T]).max()) * far + 0.5 * float(np.abs(second[:LOG_T]).max()) * far**2
+    return replace(solution, error=solution.error + moved, status=Status.CONVERGED)

@@ -7,18 +7,19 @@ them whole, or followed through folds in Q, M and T_surface by the general conti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from chuteflow.analysis.crossings import Chord, turning_point
+from chuteflow.analysis.chords import Chord
 from chuteflow.analysis.existence import imbalance
 from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
-from chuteflow.analysis.tracing import TracedFamily
+from chuteflow.analysis.tracing import Stretch, TracedFamily
+from chuteflow.analysis.turns import may_turn, turns
 from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
@@ -60,7 +61,7 @@ def curve(
     found = traced_families(problem, within)
     longest = max((float(family.arclength[-1]) for family in found), default=1.0)
     branches = [
-        _branch(chute, *stretch, tolerance)
+        _branch(chute, family, stretch, tolerance)
         for family in found
         for stretch in family.sampled(_samples(family, points, float(family.arclength[-1]) / longest), tolerance)
     ]
@@ -80,63 +81,91 @@ def _samples(family: TracedFamily, points: int, share: float) -> int:
     return max(8, round(points * share), min(points, len(family.solutions)))
 
 
-def _branch(chute: Chute, solutions: list[Solution], ends: tuple[str, str], tolerance: float) -> Branch:
-    if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
-        solutions.reverse()
-        ends = (ends[1], ends[0])
-    flows = flows_of(chute, solutions)
-    special = [*_folds(chute, solutions, tolerance), *_changes(flows, tolerance)]
-    return Branch(tuple(flows), tuple(sorted(special, key=lambda point: point.position)), ends)
+def _branch(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float) -> Branch:
+    located = [*_folds(chute, family, stretch, tolerance), *_changes(chute, family, stretch, tolerance)]
+    if stretch.solutions[0].macroscopic[LOG_T] < stretch.solutions[-1].macroscopic[LOG_T]:
+        stretch = stretch.reversed()
+    flows = flows_of(chute, stretch.solutions)
+    heading = np.sign(stretch.places[-1] - stretch.places[0])
+    special = []
+    for kind, flow, place in sorted(located, key=lambda one: heading * one[2]):
+        before = int(np.searchsorted(heading * stretch.places, heading * place, side="right")) - 1
+        special.append(SpecialPoint(kind, flow, min(max(before, 0), len(flows) - 2)))
+    return Branch(tuple(flows), tuple(special), stretch.ends)
 
 
-def _folds(chute: Chute, solutions: Sequence[Solution], tolerance: float) -> list[SpecialPoint]:
-    """Flows at which Q, M or T_surface turns."""
-    macroscopic = np.array([s.macroscopic for s in solutions])
-    found = []
-    for kind, which in _FOLDS.items():
-        steps = np.diff(macroscopic[:, which])
-        for i in np.flatnonzero((steps[:-1] > 0.0) != (steps[1:] > 0.0)).tolist():
-            turn = _turn(solutions[i : i + 3], which, tolerance)
-            if turn is not None:
-                found.append(SpecialPoint(kind, Flow(chute, turn[1]), i + (turn[0] >= 0.5)))
-    return found
+def _folds(
+    chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float
+) -> Iterator[tuple[str, Flow, float]]:
+    """Flows at which Q, M or T_surface turns, with their arclengths."""
+    path, at = family.path(stretch)
+    kinds = {which: kind for kind, which in _FOLDS.items()}
+    for turn in turns(path, tuple(kinds), tolerance):
+        yield kinds[turn.which], Flow(chute, turn.solution), float(np.interp(turn.place, np.arange(len(at)), at))
 
 
-def _turn(three: Sequence[Solution], which: int, tolerance: float, halvings: int = 6) -> tuple[float, Solution] | None:
-    """The flow at which a quantity turns that rises and falls, or falls and rises, along ``three`` flows, and its
-    place, 0 to 1 along them. Where a family turns too sharply for its chords, they are halved."""
-    for half, pair in enumerate(pairwise(three)):
-        turn = turning_point(*pair, which, tolerance)
-        if turn is not None:
-            return 0.5 * half + 0.25, turn
-    if not halvings:
-        return None
-    first, middle, last = three
-    finer = [first, Chord(first, middle, tolerance).at(0.5), middle, Chord(middle, last, tolerance).at(0.5), last]
-    steps = np.diff([s.macroscopic[which] for s in finer])
-    i = int(np.argmax((steps[:-1] > 0.0) != (steps[1:] > 0.0)))
-    turn = _turn(finer[i : i + 3], which, tolerance, halvings - 1)
-    return None if turn is None else (0.25 * i + 0.5 * turn[0], turn[1])
+def _changes(
+    chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float
+) -> Iterator[tuple[str, Flow, float]]:
+    """Flows at which the density turns inverted, or the interior another kind, with their arclengths."""
+    path, at = family.path(stretch)
+    flows = flows_of(chute, path)
+    for kind, quantity in (
+        ("density-inversion", lambda flow: flow.density_excess),
+        ("interior-change", lambda flow: flow.net_loss_range[0]),
+        ("interior-change", lambda flow: flow.net_loss_range[1]),
+    ):
+        values = np.array([quantity(flow) for flow in flows])
+        dips = _dips(values, at)
+        for i in range(len(flows) - 1):
+            if (values[i] > 0.0) != (values[i + 1] > 0.0):
+                found = [_zero(flows[i], flows[i + 1], quantity, (values[i], values[i + 1]), tolerance)]
+            elif i in dips:
+                found = _pair(flows[i], flows[i + 1], quantity, dips[i], tolerance)
+            else:
+                continue
+            yield from ((kind, flow, at[i] + share * (at[i + 1] - at[i])) for share, flow in found)
 
 
-def _changes(flows: Sequence[Flow], tolerance: float) -> list[SpecialPoint]:
-    """Flows at which the density turns inverted, or the interior another kind."""
-    found = []
-    for i in range(len(flows) - 1):
-        for kind, quantity in (
-            ("density-inversion", lambda flow: flow.density_excess),
-            ("interior-change", lambda flow: flow.net_loss_range[0]),
-            ("interior-change", lambda flow: flow.net_loss_range[1]),
-        ):
-            ends = quantity(flows[i]), quantity(flows[i + 1])
-            if (ends[0] > 0.0) != (ends[1] > 0.0):
-                found.append(SpecialPoint(kind, _zero(flows[i], flows[i + 1], quantity, ends, tolerance), i))
-    return found
+def _dips(values: Array, at: Array) -> dict[int, float]:
+    """Steps of a path between values of one sign, in which a quantity turns and may pass zero: the step, and the share
+    of it at which it comes nearest to that, as the cubic with slopes by differences says."""
+    if len(values) < 3:
+        return {}
+    slope = np.gradient(values, at)
+    out = {}
+    for i in np.flatnonzero(may_turn(np.diff(values) / np.diff(at))).tolist():
+        length = at[i + 1] - at[i]
+        (f0, f1), (d0, d1) = values[i : i + 2], slope[i : i + 2] * length
+        cubic = np.array([2.0 * (f0 - f1) + d0 + d1, 3.0 * (f1 - f0) - 2.0 * d0 - d1, d0, f0])
+        turning = np.roots(np.polyder(cubic))
+        inside = turning.real[(turning.imag == 0.0) & (turning.real > 0.0) & (turning.real < 1.0)]
+        if len(inside):
+            lowest = float(min(inside, key=lambda x: np.sign(f0) * np.polyval(cubic, x)))
+            # The slopes are rough: what comes as near to zero as half of the way that it goes is looked at.
+            if np.sign(f0) * np.polyval(cubic, lowest) < 0.5 * (max(abs(f0), abs(f1)) - abs(np.polyval(cubic, lowest))):
+                out[i] = lowest
+    return out
+
+
+def _pair(
+    first: Flow, last: Flow, quantity: Callable[[Flow], float], share: float, tolerance: float
+) -> list[tuple[float, Flow]]:
+    """The two zeros to either side of a share of the chord between two flows, if the sign is another one there."""
+    middle = Flow(first.chute, Chord(first.solution, last.solution, tolerance).at(share))
+    values = quantity(first), quantity(middle), quantity(last)
+    if (values[0] > 0.0) == (values[1] > 0.0):
+        return []
+    (one, before) = _zero(first, middle, quantity, values[:2], tolerance)
+    (two, after) = _zero(middle, last, quantity, values[1:], tolerance)
+    return [(share * one, before), (share + (1.0 - share) * two, after)]
 
 
 def _zero(
     first: Flow, last: Flow, quantity: Callable[[Flow], float], ends: tuple[float, float], tolerance: float
-) -> Flow:
+) -> tuple[float, Flow]:
+    """Where a quantity vanishes between two flows: the share of the chord, and the flow."""
     chute = first.chute
     chord = Chord(first.solution, last.solution, tolerance)
-    return Flow(chute, chord.zero(lambda s: quantity(Flow(chute, s)), ends))
+    flow = Flow(chute, chord.zero(lambda s: quantity(Flow(chute, s)), ends))
+    return float(np.clip(chord.place(flow.solution), 0.0, 1.0)), flow

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.analysis.crossings import Chord, Knot
+from chuteflow.analysis.chords import Chord
+from chuteflow.analysis.crossings import Knot
 from chuteflow.analysis.ranges import Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array, tail
@@ -94,6 +95,20 @@ class FamilySystem:
 
 
 @dataclass(frozen=True, eq=False)
+class Stretch:
+    """Solved flows in order along a family, the arclengths ``places`` (k,) at which they are, and why the stretch ends
+    at either side, in words."""
+
+    solutions: list[Solution]
+    places: Array
+    ends: tuple[str, str]
+
+    def reversed(self) -> Stretch:
+        """The same from the other end."""
+        return Stretch(self.solutions[::-1], self.places[::-1], (self.ends[1], self.ends[0]))
+
+
+@dataclass(frozen=True, eq=False)
 class TracedFamily:
     """A family as far as it goes within a range: solved flows in order, the last ones at the edges.
 
@@ -147,11 +162,11 @@ class TracedFamily:
                 return True
         return False
 
-    def sampled(self, count: int, tolerance: float) -> list[tuple[list[Solution], tuple[str, str]]]:
+    def sampled(self, count: int, tolerance: float) -> list[Stretch]:
         """``count`` flows from end to end, evenly in arclength, each solved to ``tolerance``.
 
-        They come as one stretch with its ends in words, or as several of two flows or more, where flows between
-        them, or at the ends, could not be solved: then the ends say why.
+        They come as one stretch, or as several of two flows or more, where flows between them, or at the ends, could
+        not be solved: then the ends say why.
 
         Raises:
             SolveError: where there is no such stretch.
@@ -167,8 +182,9 @@ class TracedFamily:
         good = [solution.converged for solution in solutions]
         edges = np.flatnonzero(np.diff([False, *good, False])).tolist()
         stretches = [
-            (
+            Stretch(
                 solutions[first:last],
+                places[first:last],
                 (
                     solutions[first - 1].status.value if first else self.ends[0],
                     solutions[last].status.value if last < count else self.ends[1],
@@ -181,6 +197,15 @@ class TracedFamily:
             bad = solutions[good.index(False)]
             raise SolveError(f"a flow of a family could not be solved: {bad.status.value}")
         return stretches
+
+    def path(self, stretch: Stretch) -> tuple[list[Solution], Array]:
+        """The flows that the family was followed by, between the ends of a stretch and these, and their arclengths:
+        they are the same for any number of flows sampled."""
+        first, last = stretch.places[[0, -1]]
+        margin = _ON_EDGE * float(self.arclength[-1])
+        inside = np.flatnonzero((self.arclength > first + margin) & (self.arclength < last - margin))
+        solutions = [stretch.solutions[0], *(self.solutions[i] for i in inside), stretch.solutions[-1]]
+        return solutions, np.array([first, *self.arclength[inside], last])
 
 
 def traced(start: Solution, ahead: Array, within: Range, control: Control = CONTROL) -> TracedFamily:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.analysis.crossings import Chord
+from chuteflow.analysis.chords import Chord
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability.verdict import Stability, stability_of

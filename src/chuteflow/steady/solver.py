@@ -13,7 +13,7 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.newton import newton
+from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
 from chuteflow.steady.model import Model
 
@@ -111,8 +111,12 @@ def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float
     returned. The grid is refined until the change is below ``tolerance``, or below what rounding does, which
     is more very close to a fold.
     """
-    weights = np.array(condition.weights)
-    value = np.array(condition.value)
+    # A flow that runs away, or has no neighbours to step to, is told by what is not finite.
+    with np.errstate(all="ignore"):
+        return _solve(problem, z, np.array(condition.weights), np.array(condition.value), tolerance)
+
+
+def _solve(problem: Collocation, z: Array, weights: Array, value: Array, tolerance: float) -> Solution:
     finer_degrees = [d for d in DEGREES if d > problem.degree]
     while True:
         result = newton(
@@ -122,9 +126,9 @@ def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float
             longest_step=2.0,
         )
         z = result.z
-        if not result.converged:
-            return Solution(problem, z, np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE)
         coarse = problem.state(z).macroscopic()
+        if not (result.converged and np.isfinite(coarse).all()):
+            return Solution(problem, z, np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE)
         if not finer_degrees:
             return Solution(problem, z, coarse, np.inf, Status.UNRESOLVED)
         problem, z = prolong(problem, z, finer_degrees.pop(0))
@@ -180,7 +184,7 @@ def _side_by_side(
     with np.errstate(all="ignore"):
         for _ in range(_MOST_SIDE_BY_SIDE):
             f, jacobian = _system(together.state(z), weights, value)
-            move = np.linalg.solve(jacobian, f[..., None])[..., 0]
+            move = solve_each(jacobian, f[..., None])[..., 0]
             step = np.abs(move).max(axis=-1)
             z = np.where((step < _FAR)[:, None], z - move, z)
             if not (step >= _STEP).any():
@@ -208,11 +212,11 @@ def _refined(
     the residuals and of the tabulated closures can do to them."""
     state = problem.state(z)
     f, jacobian = _system(state, weights, value)
-    z = z - np.linalg.solve(jacobian, f[..., None])[..., 0]
+    z = z - solve_each(jacobian, f[..., None])[..., 0]
     fine = problem.state(z).macroscopic()
     change = np.abs(fine - coarse)[..., :LOG_T].max(axis=-1)
     gradient = np.swapaxes(state.macroscopic_gradient()[..., :LOG_T, :], -1, -2)
-    adjoint = np.linalg.solve(np.swapaxes(jacobian, -1, -2), gradient)
+    adjoint = solve_each(np.swapaxes(jacobian, -1, -2), gradient)
     sensitivity = np.abs(adjoint).sum(axis=-2).max(axis=-1)
     return z, fine, change, np.maximum(_FLOOR, _NOISE * sensitivity)
 

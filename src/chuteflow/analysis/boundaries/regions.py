@@ -18,6 +18,7 @@ from chuteflow.analysis.enumeration import flows
 from chuteflow.analysis.ranges import Range
 from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError
+from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.solver import Solution
@@ -87,7 +88,7 @@ def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solut
 
 def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     """The kinds of the flows at smaller and at larger values of the second parameter, beside point ``index`` of a
-    boundary, with the quantity ``which`` held; None for folds."""
+    boundary, with the quantity ``which`` held; None for folds, and where that quantity has a fold itself."""
     point: BoundaryPoint = boundary.traced.points[index]
     condition = point.system.condition
     if isinstance(condition, Inversion):
@@ -100,5 +101,7 @@ def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     matrix = np.concatenate([at.by_z, at.state.macroscopic_gradient()[which][None]])
     moved = np.append(at.by_parameter, at.stepped.macroscopic()[which].imag / IMAGINARY_STEP)
     _, by_z, by_parameter = condition(at)
-    rate = by_parameter - float(by_z @ np.linalg.solve(matrix, moved))
+    rate = by_parameter - float(by_z @ solve_each(matrix, moved))
+    if not np.isfinite(rate):
+        return None
     return kinds if rate > 0.0 else (kinds[1], kinds[0])

@@ -20,7 +20,7 @@ import numpy as np
 from chuteflow.analysis.boundaries.conditions import Condition, Fold, InteriorChange, Inversion, Local
 from chuteflow.analysis.boundaries.points import BoundaryPoint, shift, solved, through
 from chuteflow.analysis.boundaries.system import BoundarySystem, Sweep
-from chuteflow.analysis.crossings import Chord
+from chuteflow.analysis.chords import Chord
 from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import Range
 from chuteflow.analysis.tracing import TracedFamily

@@ -1,0 +1,351 @@
+"""Where ln Q, ln h, ln M and ln T_surface turn along a branch of flows.
+
+# notation: F(z) = 0 the steady problem, m one of the four quantities, sigma runs from 0 to 1 along the chord between
+# two flows in the plane (ln M, ln T_surface), w the row that takes d(ln M, ln T_surface) to d sigma.
+
+Between two solved flows nothing is taken to be monotonic. At either end the derivatives along the branch are exact:
+
+    [F_z; w] z' = [0; 1],    [F_z; w] z'' = -[F_zz; w_z] z' z',    m' = m_z z',    m'' = m_z z'' + m_zz z' z'.
+
+The four numbers m', m'' at both ends give a cubic for m' between them; its integral must be the difference of m. What is missing there is added as a
+bump, and tells how far the model can be trusted: where it leaves open whether m' has a zero, or a pair of them, as
+two folds just past a cusp are, the stretch is halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.analysis.chords import Chord
+from chuteflow.errors import SolveError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.newton import solve_each
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation
+from chuteflow.steady.model import IMAGINARY_STEP
+from chuteflow.steady.solver import TOLERANCE, Solution, in_parts
+
+#: All quantities, by their places in the macroscopic ones.
+EVERY = (LOG_Q, LOG_H, LOG_M, LOG_T)
+#: The row of derivatives is chosen anew where the branch runs off it by more than this, at most so often.
+_OFF_ROW, _ROWS_TRIED = 2.0, 3
+#: Step along the branch of the central difference of exact first derivatives.
+_DIFFERENCE = 1e-5
+#: A chord is halved where the branch runs to it at an angle whose cosine is smaller.
+_ALONG = 0.6
+#: The bump counts so many times, and may be this part of the largest m', or of the chord; flows have errors, and it
+#: is not known better than so many times them.
+_SAFETY, _SMALL, _NOISE = 4.0, 0.1, 8.0
+#: How often a stretch is halved. A chord of 0.5 is then as short as 5e-4.
+_HALVINGS = 10
+#: An m' below this share of the chord is rounding.
+_FLAT = 1e-10
+#: A place is known after a step of Newton's below this, in sigma; steps and brackets that rounding hides.
+_CLOSE, _LOST, _SMALLEST, _MOST_STEPS = 1e-6, 1e-14, 1e-12, 60
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """A solved flow with the ``first`` and ``second`` derivatives (4,) of ln Q, ln h, ln M and ln T_surface along its
+    branch, with respect to any one parameter that grows along it."""
+
+    solution: Solution
+    first: Array
+    second: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A flow at which the quantity ``which`` turns; ``place`` counts along the path: 2.5 is between flows 2 and 3."""
+
+    which: int
+    place: float
+    solution: Solution
+
+
+def expansions(solutions: Sequence[Solution], ahead: Array) -> list[Expansion]:
+    """The expansions of flows of one chute, where their branch goes about ``ahead`` (k, 2) (d ln M, d ln T_surface)."""
+    out: dict[int, Expansion] = {}
+    by_degree: dict[int, list[int]] = {}
+    for i, solution in enumerate(solutions):
+        by_degree.setdefault(solution.problem.degree, []).append(i)
+    for members in by_degree.values():
+        for some in in_parts(members):
+            first, second = _derivatives([solutions[i] for i in some], ahead[some])
+            out |= {i: Expansion(solutions[i], first[row], second[row]) for row, i in enumerate(some)}
+    return [out[i] for i in range(len(solutions))]
+
+
+def _derivatives(solutions: Sequence[Solution], ahead: Array) -> tuple[Array, Array]:
+    """First and second derivatives (k, 4) of the quantities of flows on grids of one degree."""
+    one = solutions[0].problem
+    stretch = np.array([[float(np.reshape(s.problem.stretch, ()))] for s in solutions])
+    problem = Collocation(one.model, one.degree, stretch)
+    z = np.array([s.z for s in solutions])
+    with np.errstate(all="ignore"):
+        state = problem.state(z)
+        jacobian, gradient = state.jacobian(), state.macroscopic_gradient()
+        side = np.zeros((*z.shape, 1))
+        side[:, -1] = 1.0
+        row = np.asarray(ahead, dtype=float)
+        for _ in range(_ROWS_TRIED):
+            along = solve_each(_with_row(jacobian, gradient, row), side)[..., 0]
+            plane = np.einsum("kqn,kn->kq", gradient[:, LOG_M:], along)
+            length = np.hypot(*plane.T)
+            off = length > _OFF_ROW * np.hypot(*row.T)
+            if not off.any():
+                break
+            row = np.where(off[:, None], plane / length[:, None], row)
+        bent, turned = _second_along(problem, z, along)
+        side[:, :-1, 0] = -bent
+        side[:, -1, 0] = -(row * turned[:, LOG_M:]).sum(axis=-1)
+        bend = solve_each(_with_row(jacobian, gradient, row), side)[..., 0]
+    return (
+        np.einsum("kqn,kn->kq", gradient, along),
+        np.einsum("kqn,kn->kq", gradient, bend) + turned,
+    )
+
+
+def _second_along(problem: Collocation, z: Array, along: Array) -> tuple[Array, Array]:
+    """Second derivatives of the residual (k, n+2) and of the quantities (k, 4) along a direction (k, n+3).
+
+    The first ones are exact, by an imaginary step; of these a central difference is taken.
+    """
+    sides = []
+    for step in (_DIFFERENCE, -_DIFFERENCE):
+        state = problem.state(cast(Array, z + (step + 1j * IMAGINARY_STEP) * along))
+        sides.append(np.concatenate([state.residual().imag, state.macroscopic().imag], axis=-1))
+    both = (sides[0] - sides[1]) / (2.0 * _DIFFERENCE * IMAGINARY_STEP)
+    return both[:, :-4], both[:, -4:]
+
+
+def _with_row(jacobian: Array, gradient: Array, row: Array) -> Array:
+    last = np.einsum("kq,kqn->kn", row, gradient[:, LOG_M:])
+    return np.concatenate([jacobian, last[:, None]], axis=1)
+
+
+def directions(plane: Array) -> Array:
+    """Unit vectors (k, 2) along a path (k, 2), by the points to either side of each."""
+    ahead = np.gradient(plane, axis=0)
+    length = np.hypot(*ahead.T)[:, None]
+    return np.where(length > 0.0, ahead / np.where(length > 0.0, length, 1.0), np.array([1.0, 0.0]))
+
+
+def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Turn]:
+    """Every flow between the first and the last of ``path``, successive flows of one branch, at which one of the
+    quantities ``which`` turns, in order along it.
+
+    Raises:
+        SolveError: where the branch could not be followed to one.
+    """
+    if len(path) < 2:
+        return []
+    at = expansions(path, directions(np.array([s.macroscopic[LOG_M:] for s in path])))
+    models = Models.between(at[:-1], at[1:])
+    found = [
+        Turn(quantity, i + place, solution)
+        for i in np.flatnonzero(models.open(which)).tolist()
+        for quantity, place, solution in _between(at[i], at[i + 1], which, tolerance, _HALVINGS)
+    ]
+    return sorted(found, key=lambda turn: turn.place)
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """Models of m' over sigma in stretches between flows: ``slope`` (k, 4, 5) the coefficients of a quartic in
+    Bernstein's basis, ``bump`` (k, 4) what of it is not known by its ends, ``length`` (k,) of the chords; ``sure``
+    (k,) where the chords can be relied on."""
+
+    slope: Array
+    bump: Array
+    length: Array
+    sure: NDArray[np.bool_]
+
+    @classmethod
+    def between(cls, first: Sequence[Expansion], last: Sequence[Expansion]) -> Models:
+        """The models between flows ``first`` (k) and ``last`` (k)."""
+        ends = [np.array([e.solution.macroscopic for e in part]) for part in (first, last)]
+        gain = ends[1] - ends[0]
+        length = np.hypot(*gain[:, LOG_M:].T)
+        row = gain[:, LOG_M:] / np.where(length > 0.0, length, 1.0)[:, None] ** 2
+        with np.errstate(all="ignore"):
+            begin, end = _over_sigma(first, row), _over_sigma(last, row)
+            # Cosine of the angle to the chord: d sigma per arclength, times the chord.
+            cosines = [length / np.hypot(*part[0][:, LOG_M:].T) for part in (begin, end)]
+            forward = [np.isfinite(part[0]).all(axis=1) & (part[2] > 0.0) for part in (begin, end)]
+            whole = 0.5 * (begin[0] + end[0]) + (begin[1] - end[1]) / 12.0
+            bump = 5.0 * (gain - whole)  # in the middle coefficient; 3/8 of it in m'
+            slope = np.stack(
+                [
+                    begin[0],
+                    begin[0] + 0.25 * begin[1],
+                    0.5 * (begin[0] + end[0]) + (begin[1] - end[1]) / 6.0 + bump,
+                    end[0] - 0.25 * end[1],
+                    end[0],
+                ],
+                axis=-1,
+            )
+            noise = 5.0 * _NOISE * np.array([a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)])
+            unknown = np.maximum(np.abs(bump) - noise[:, None], 0.0)
+            size = np.maximum(np.abs(slope).max(axis=-1), length[:, None])
+            sure = (unknown < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG) & forward[0] & forward[1]
+        return cls(slope, unknown, length, sure)
+
+    def open(self, which: Sequence[int]) -> NDArray[np.bool_]:
+        """Whether one of the quantities may turn (k,)."""
+        low, high = self.slope[:, which].copy(), self.slope[:, which].copy()
+        low[..., 2] -= _SAFETY * self.bump[:, which]
+        high[..., 2] += _SAFETY * self.bump[:, which]
+        monotonic = (low.min(axis=-1) > 0.0) | (high.max(axis=-1) < 0.0)
+        return (self.length > 0.0) & ~(self.sure & monotonic.all(axis=1))
+
+
+def _over_sigma(at: Sequence[Expansion], row: Array) -> tuple[Array, Array, Array]:
+    """First and second derivatives (k, 4) with respect to sigma, which ``row`` (k, 2) gives, and that of sigma (k,)."""
+    first, second = np.array([e.first for e in at]), np.array([e.second for e in at])
+    pace = (row * first[:, LOG_M:]).sum(axis=1)
+    bend = (row * second[:, LOG_M:]).sum(axis=1)
+    slope = first / pace[:, None]
+    return slope, (second - slope * bend[:, None]) / pace[:, None] ** 2, pace
+
+
+def _between(
+    first: Expansion, last: Expansion, which: Sequence[int], tolerance: float, halvings: int
+) -> Iterator[tuple[int, float, Solution]]:
+    """The turns in a stretch: the quantity, the place from 0 to 1, and the flow."""
+    models = Models.between([first], [last])
+    if not models.open(which)[0]:
+        return
+    chord = Chord(first.solution, last.solution, tolerance)
+    brackets = {quantity: _brackets(models, quantity) for quantity in which}
+    if models.sure[0] and all(found is not None for found in brackets.values()):
+        located = [
+            (quantity, _located(chord, quantity, bracket))
+            for quantity, found in brackets.items()
+            for bracket in found or ()
+        ]
+        if all(turn is not None for _, turn in located):
+            yield from ((quantity, *turn) for quantity, turn in located if turn is not None)
+            return
+    if not halvings:
+        raise SolveError("a branch turns too sharply to tell its turning points: narrow the range searched")
+    middle = chord.at(0.5)
+    ahead = (last.solution.macroscopic - first.solution.macroscopic)[None, LOG_M:]
+    (between,) = expansions([middle], ahead / np.hypot(*ahead.T)[:, None])
+    for quantity, place, turn in _between(first, between, which, tolerance, halvings - 1):
+        yield quantity, 0.5 * place, turn
+    for quantity, place, turn in _between(between, last, which, tolerance, halvings - 1):
+        yield quantity, 0.5 + 0.5 * place, turn
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Where a function changes sign: between ``low`` and ``high`` in sigma, about at ``start``; its value ``before``
+    at ``low``, or another one of that sign."""
+
+    low: float
+    high: float
+    start: float
+    before: float
+
+
+def _brackets(models: Models, which: int) -> list[Bracket] | None:
+    """Where the one stretch has turns of a quantity; None where its model does not tell."""
+    b = models.slope[0, which]
+    quartic = _FROM_BERNSTEIN @ b
+    roots = np.roots(np.polyder(quartic))
+    inside = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0) & (roots.real < 1.0)])
+    stops = np.array([0.0, *inside, 1.0])
+    values = np.polyval(quartic, stops)
+    values[0], values[-1] = b[0], b[-1]
+    unknown = _SAFETY * models.bump[0, which] * 6.0 * (stops * (1.0 - stops)) ** 2
+    flat = _FLAT * models.length[0]
+    if (np.abs(values) < unknown).any():
+        return None
+    told = (np.abs(values) > flat) | (stops == 0.0) | (stops == 1.0)
+    stops, values = stops[told], values[told]
+    changes = np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
+    zeros = np.roots(quartic).real
+    out = []
+    for i in changes.tolist():
+        low, high = float(stops[i]), float(stops[i + 1])
+        between = zeros[(zeros > low) & (zeros < high)]
+        start = float(between[0]) if len(between) == 1 else 0.5 * (low + high)
+        out.append(Bracket(low, high, start, float(values[i])))
+    return out
+
+
+#: Powers, highest first, of a quartic from its coefficients in Bernstein's basis.
+_FROM_BERNSTEIN = np.array(
+    [
+        [1.0, -4.0, 6.0, -4.0, 1.0],
+        [-4.0, 12.0, -12.0, 4.0, 0.0],
+        [6.0, -12.0, 6.0, 0.0, 0.0],
+        [-4.0, 4.0, 0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+)
+
+
+def _located(chord: Chord, which: int, bracket: Bracket) -> tuple[float, Solution] | None:
+    """The turn in a bracket of a chord; None where it is not there."""
+
+    def slope(solution: Solution) -> tuple[float, float]:
+        first, second = along(chord, solution)
+        return float(first[which]), float(second[which])
+
+    return find_zero(chord, slope, bracket)
+
+
+def along(chord: Chord, solution: Solution) -> tuple[Array, Array]:
+    """First and second derivatives (4,) of the quantities with respect to sigma at a flow of the stretch."""
+    row = np.array([chord.row])
+    first, second, _ = _over_sigma(expansions([solution], row / np.hypot(*row.T)[:, None]), row)
+    return first[0], second[0]
+
+
+def find_zero(
+    chord: Chord, function: Callable[[Solution], tuple[float, float]], bracket: Bracket
+) -> tuple[float, Solution] | None:
+    """Where ``function``, which gives a value and its derivative with respect to sigma, vanishes in a bracket: the
+    place and the flow; None where it keeps its sign.
+
+    Newton's method, and where it leaves the bracket, bisection.
+    """
+    low, high, sigma = bracket.low, bracket.high, bracket.start
+    # What a model says of a place inside is known when a flow has been seen beyond it.
+    low_known, high_known = low == 0.0, high == 1.0
+    for _ in range(_MOST_STEPS):
+        solution = chord.at(sigma)
+        value, slope = function(solution)
+        step = -value / slope if slope else np.inf
+        there = sigma + step
+        if abs(step) < _CLOSE and low - _CLOSE <= there <= high + _CLOSE:
+            return there, solution if abs(step) < _LOST else chord.at(there)
+        if (value > 0.0) == (bracket.before > 0.0):
+            low, low_known = sigma, True
+        else:
+            high, high_known = sigma, True
+        if high - low < _SMALLEST:
+            return (sigma, solution) if low_known and high_known else None
+        sigma = there if low < there < high else 0.5 * (low + high)
+    return None
+
+
+def may_turn(slope: Array, noise: Array | float = 0.0) -> NDArray[np.bool_]:
+    """Whether a quantity may turn in the steps of a rough path, or in those beside them, given its ``slope`` (k, ...)
+    in each by differences, which are known to ``noise``; NaN where a step is missing.
+
+    So it may where the slope changes as much from step to step as it is large: then it, or within the step its own
+    turn, may have reached zero.
+    """
+    change = np.abs(np.diff(slope, axis=0))
+    none = np.zeros_like(slope[:1])
+    beside = np.fmax(np.concatenate([none, change]), np.concatenate([change, none]))
+    with np.errstate(invalid="ignore"):
+        return np.abs(slope) <= beside + noise
