@@ -12,7 +12,7 @@ import numpy as np
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, Collocation
-from chuteflow.steady.solver import TOLERANCE, Condition, Solution, between, solve
+from chuteflow.steady.solver import TOLERANCE, Condition, Solution, alike, solve
 
 #: A chord is searched until sigma is known to this.
 _CLOSE = 1e-9
@@ -28,6 +28,7 @@ class Chord:
         self.row = (float(weights[0]), float(weights[1]))
         self._begin = float(weights @ first.macroscopic[LOG_M:])
         self._known = [(0.0, first), (1.0, last)]
+        self._alike: dict[tuple[float, float], tuple[Collocation, Array, Array]] = {}
         self._tolerance = tolerance
 
     def at(self, sigma: float) -> Solution:
@@ -53,7 +54,10 @@ class Chord:
     def start_at(self, sigma: float) -> tuple[Collocation, Array]:
         """Where the solver may start from at ``sigma``: between the nearest flows known."""
         (at, near), (other_at, other) = sorted(self._known, key=lambda known: abs(known[0] - sigma))[:2]
-        return between(near, other, (sigma - at) / (other_at - at))
+        if (at, other_at) not in self._alike:
+            self._alike[at, other_at] = alike(near, other)
+        problem, z, other_z = self._alike[at, other_at]
+        return problem, z + (sigma - at) / (other_at - at) * (other_z - z)
 
     def zero(self, function: Callable[[Solution], float], ends: tuple[float, float]) -> Solution:
         """The flow at which ``function`` vanishes, given its values of opposite sign at the ends.

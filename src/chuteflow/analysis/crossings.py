@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.chords import Chord
-from chuteflow.analysis.turns import Bracket, along, directions, expansions, find_zero, may_turn, turns
+from chuteflow.analysis.turns import Bracket, along, directions, find_zero, may_turn, turns
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation
@@ -69,14 +69,19 @@ class Knot:
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """Knots in order along a family; ``turns`` are those at which the quantity asked for turns."""
+    """Knots in order along a family and their ``macroscopic`` (k, 4); ``turns`` are those at which the quantity asked
+    for turns."""
 
-    knots: list[Knot]
-    turns: list[Knot]
+    knots: Sequence[Knot]
+    macroscopic: Array
+    turns: Sequence[Knot]
 
 
-def crossings(knots: Sequence[Knot], which: int, value: float, tolerance: float) -> Iterator[Solution]:
-    """Flows of the family through ``knots`` at which the quantity ``which`` equals ``value``.
+def crossings(
+    knots: Sequence[Knot], macroscopic: Array, which: int, value: float, tolerance: float
+) -> Iterator[Solution]:
+    """Flows of the family through ``knots``, with quantities ``macroscopic`` (k, 4), at which the quantity ``which``
+    equals ``value``.
 
     So near to a turn that rounding hides on which side of it the value lies, the flow at the turn is one of them, with
     an error that says so.
@@ -85,12 +90,9 @@ def crossings(knots: Sequence[Knot], which: int, value: float, tolerance: float)
         SolveError: where a flow that is bracketed could not be solved.
     """
     target = float(np.log(value))
-    path = _with_turns(knots, which, target)
-    brackets = [
-        pair
-        for pair in pairwise(path.knots)
-        if (pair[0].macroscopic[which] >= target) != (pair[1].macroscopic[which] >= target)
-    ]
+    path = _with_turns(_Path(knots, macroscopic, ()), which, target)
+    above = path.macroscopic[:, which] >= target
+    brackets = [(path.knots[i], path.knots[i + 1]) for i in np.flatnonzero(above[1:] != above[:-1]).tolist()]
     exact = [pair for pair in brackets if pair[0].exact is not None and pair[1].exact is not None]
     rough = [pair for pair in brackets if pair[0].exact is None or pair[1].exact is None]
     for turn in path.turns:
@@ -111,20 +113,26 @@ def _from_rough(
     target, condition = float(np.log(value)), Condition.fix(which, value)
     nearer = [min(pair, key=lambda knot: abs(knot.macroscopic[which] - target)) for pair in brackets]
     direct = solve_many([knot.start(_STARTS[0]) for knot in nearer], [condition] * len(nearer), tolerance)
-    for i, (pair, knot, found) in enumerate(zip(brackets, nearer, direct, strict=True)):
-        solution = found if found.converged else knot.solved(condition, tolerance)
+    solutions = [
+        found if found.converged else knot.solved(condition, tolerance)
+        for knot, found in zip(nearer, direct, strict=True)
+    ]
+    for i, (pair, solution) in enumerate(zip(brackets, solutions, strict=True)):
         # Of the flows of two brackets that are one flow, one at least has strayed.
-        contested = any(_same(found, other) for j, other in enumerate(direct) if j != i)
+        contested = any(_same(solution, other) for j, other in enumerate(solutions) if j != i)
         if contested or not _is_between(*pair, solution) or not _passes(*pair, which, solution):
             yield from _bracketed(*pair, which, value, solution, tolerance)
         else:
             yield solution
 
 
-def _with_turns(knots: Sequence[Knot], which: int, target: float) -> _Path:
-    """The path of a family: where a quantity may turn near the target its knots are solved, and the turns put in."""
-    kept = _kept(knots)
-    wanted = _near_turns([knots[i] for i in kept], which, target)
+def _with_turns(path: _Path, which: int, target: float) -> _Path:
+    """The path with its knots solved where a quantity may turn near the target, and with the turns there."""
+    knots = path.knots
+    kept = _kept(path)
+    wanted = _near_turns(path.macroscopic[kept], which, target)
+    if not wanted.any():
+        return path
     out: list[Knot] = []
     found: list[Knot] = []
     begin = 0
@@ -138,24 +146,24 @@ def _with_turns(knots: Sequence[Knot], which: int, target: float) -> _Path:
         places = [*((float(i), Knot.at(solution)) for i, solution in enumerate(stretch)), *turning]
         out += [knot for _, knot in sorted(places, key=lambda place: place[0])]
         begin = kept[last] + 1
-    return _Path([*out, *knots[begin:]], found)
+    out += knots[begin:]
+    return _Path(out, np.array([knot.macroscopic for knot in out]), found)
 
 
-def _kept(knots: Sequence[Knot]) -> list[int]:
-    """Knots with both ends, without rough ones too near to the one before."""
-    kept = [0]
-    for i in range(1, len(knots) - 1):
-        apart = min(np.hypot(*(knots[i].macroscopic - knots[j].macroscopic)[LOG_M:]) for j in (kept[-1], -1))
-        if knots[i].exact is not None or apart > _TOO_NEAR:
-            kept.append(i)
-    return [*kept, len(knots) - 1] if len(knots) > 1 else kept
+def _kept(path: _Path) -> NDArray[np.intp]:
+    """Knots with both ends, of rough ones that are near to each other only the first."""
+    lengths = np.hypot(*np.diff(path.macroscopic[:, LOG_M:], axis=0).T)
+    place = np.floor(np.append(0.0, np.cumsum(lengths)) / _TOO_NEAR)
+    kept = np.append(True, place[1:] != place[:-1])
+    kept |= np.array([knot.exact is not None for knot in path.knots])
+    kept[-1] = True
+    return np.flatnonzero(kept)
 
 
-def _near_turns(knots: Sequence[Knot], which: int, target: float) -> NDArray[np.bool_]:
-    """The steps between knots in which a quantity may turn near the target, and those beside them."""
-    macroscopic = np.array([knot.macroscopic for knot in knots])
+def _near_turns(macroscopic: Array, which: int, target: float) -> NDArray[np.bool_]:
+    """The steps between knots (k, 4) in which a quantity may turn near the target, and those beside them."""
     off = macroscopic[:, which] - target
-    if len(knots) < 2:
+    if len(off) < 2:
         return np.zeros(0, dtype=bool)
     gain, length = np.diff(off), np.maximum(np.hypot(*np.diff(macroscopic[:, LOG_M:], axis=0).T), 1e-12)
     bend = np.concatenate([[0.0], np.abs(np.diff(gain)), [0.0]])
@@ -214,16 +222,12 @@ def _is_between(a: Knot, b: Knot, solution: Solution) -> bool:
 
 
 def _passes(a: Knot, b: Knot, which: int, solution: Solution) -> bool:
-    """Whether the quantity changes along the branch at a solution as it does from one knot to the other.
-
-    Where it does not, there are three flows or more between them.
-    """
-    chord = (b.macroscopic - a.macroscopic)[LOG_M:]
-    length = float(np.hypot(*chord))
-    if length == 0.0:
+    """Whether the quantity, at the value of which a flow was solved, changes along the branch there as it does from one
+    knot to the other. Where it does not, there are three flows or more between them."""
+    if solution.response is None:
         return False
-    (at,) = expansions([solution], chord[None] / length)
-    return bool((at.first[which] > 0.0) == (b.macroscopic[which] > a.macroscopic[which]))
+    gain = b.macroscopic - a.macroscopic
+    return bool(float(solution.response[LOG_M:] @ gain[LOG_M:]) * float(gain[which]) > 0.0)
 
 
 def _bracketed(
@@ -257,7 +261,8 @@ def _on_stretch(first: Solution, last: Solution, which: int, value: float, toler
     off = float(first.macroscopic[which]) - target, float(last.macroscopic[which]) - target
 
     def excess(solution: Solution) -> tuple[float, float]:
-        return float(solution.macroscopic[which]) - target, float(along(chord, solution)[0][which])
+        assert solution.response is not None
+        return float(solution.macroscopic[which]) - target, float(solution.response[which])
 
     found = find_zero(chord, excess, Bracket(0.0, 1.0, off[0] / (off[0] - off[1]), off[0]))
     if found is None:

@@ -104,7 +104,7 @@ class _Search:
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
     found = families(problem, within, value if which == LOG_M else 0.0)
-    solutions = [s for family in found for s in crossings(family.knots, which, value, tolerance)]
+    solutions = [s for family in found for s in crossings(family.knots, family.macroscopic, which, value, tolerance)]
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)])
     return _Search(within, found, inside, [s for s in solutions if not within.contains(s.macroscopic)])
 

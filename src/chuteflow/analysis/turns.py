@@ -45,8 +45,9 @@ _SAFETY, _SMALL, _NOISE = 4.0, 0.1, 8.0
 _HALVINGS = 10
 #: An m' below this share of the chord is rounding.
 _FLAT = 1e-10
-#: A place is known after a step of Newton's below this, in sigma; steps and brackets that rounding hides.
-_CLOSE, _LOST, _SMALLEST, _MOST_STEPS = 1e-6, 1e-14, 1e-12, 60
+#: A place is known after a step of Newton's below this, in sigma, and before one below the second; a bracket ends when
+#: it is shorter than the third.
+_CLOSE, _LOST, _SMALLEST, _MOST_STEPS = 1e-6, 1e-9, 1e-12, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,44 +72,58 @@ class Turn:
 def expansions(solutions: Sequence[Solution], ahead: Array) -> list[Expansion]:
     """The expansions of flows of one chute, where their branch goes about ``ahead`` (k, 2) (d ln M, d ln T_surface)."""
     out: dict[int, Expansion] = {}
+    for members in _alike(solutions):
+        local = _Local([solutions[i] for i in members], ahead[members])
+        first, second = local.first, local.second
+        out |= {i: Expansion(solutions[i], first[row], second[row]) for row, i in enumerate(members)}
+    return [out[i] for i in range(len(solutions))]
+
+
+def _alike(solutions: Sequence[Solution]) -> Iterator[list[int]]:
+    """The places of flows on grids of one degree, as many at a time as are treated side by side."""
     by_degree: dict[int, list[int]] = {}
     for i, solution in enumerate(solutions):
         by_degree.setdefault(solution.problem.degree, []).append(i)
     for members in by_degree.values():
-        for some in in_parts(members):
-            first, second = _derivatives([solutions[i] for i in some], ahead[some])
-            out |= {i: Expansion(solutions[i], first[row], second[row]) for row, i in enumerate(some)}
-    return [out[i] for i in range(len(solutions))]
+        yield from in_parts(members)
 
 
-def _derivatives(solutions: Sequence[Solution], ahead: Array) -> tuple[Array, Array]:
-    """First and second derivatives (k, 4) of the quantities of flows on grids of one degree."""
-    one = solutions[0].problem
-    stretch = np.array([[float(np.reshape(s.problem.stretch, ()))] for s in solutions])
-    problem = Collocation(one.model, one.degree, stretch)
-    z = np.array([s.z for s in solutions])
-    with np.errstate(all="ignore"):
-        state = problem.state(z)
-        jacobian, gradient = state.jacobian(), state.macroscopic_gradient()
-        side = np.zeros((*z.shape, 1))
-        side[:, -1] = 1.0
-        row = np.asarray(ahead, dtype=float)
-        for _ in range(_ROWS_TRIED):
-            along = solve_each(_with_row(jacobian, gradient, row), side)[..., 0]
-            plane = np.einsum("kqn,kn->kq", gradient[:, LOG_M:], along)
-            length = np.hypot(*plane.T)
-            off = length > _OFF_ROW * np.hypot(*row.T)
-            if not off.any():
-                break
-            row = np.where(off[:, None], plane / length[:, None], row)
-        bent, turned = _second_along(problem, z, along)
-        side[:, :-1, 0] = -bent
-        side[:, -1, 0] = -(row * turned[:, LOG_M:]).sum(axis=-1)
-        bend = solve_each(_with_row(jacobian, gradient, row), side)[..., 0]
-    return (
-        np.einsum("kqn,kn->kq", gradient, along),
-        np.einsum("kqn,kn->kq", gradient, bend) + turned,
-    )
+class _Local:
+    """Derivatives (k, 4) of the quantities of flows on grids of one degree."""
+
+    def __init__(self, solutions: Sequence[Solution], ahead: Array) -> None:
+        one = solutions[0].problem
+        stretch = np.array([[float(np.reshape(s.problem.stretch, ()))] for s in solutions])
+        self._problem = Collocation(one.model, one.degree, stretch)
+        self._z = np.array([s.z for s in solutions])
+        self._side = np.zeros((*self._z.shape, 1))
+        self._side[:, -1] = 1.0
+        self._row = np.asarray(ahead, dtype=float)
+        with np.errstate(all="ignore"):
+            state = self._problem.state(self._z)
+            self._jacobian, self._gradient = state.jacobian(), state.macroscopic_gradient()
+            for _ in range(_ROWS_TRIED):
+                self._along = solve_each(self._bordered(), self._side)[..., 0]
+                self.first = np.einsum("kqn,kn->kq", self._gradient, self._along)
+                length = np.hypot(*self.first[:, LOG_M:].T)
+                off = length > _OFF_ROW * np.hypot(*self._row.T)
+                if not off.any():
+                    break
+                self._row = np.where(off[:, None], self.first[:, LOG_M:] / length[:, None], self._row)
+
+    @property
+    def second(self) -> Array:
+        """Second derivatives, with respect to the parameter of the ``first`` ones."""
+        with np.errstate(all="ignore"):
+            bent, turned = _second_along(self._problem, self._z, self._along)
+            self._side[:, :-1, 0] = -bent
+            self._side[:, -1, 0] = -(self._row * turned[:, LOG_M:]).sum(axis=-1)
+            bend = solve_each(self._bordered(), self._side)[..., 0]
+        return np.einsum("kqn,kn->kq", self._gradient, bend) + turned
+
+    def _bordered(self) -> Array:
+        last = np.einsum("kq,kqn->kn", self._row, self._gradient[:, LOG_M:])
+        return np.concatenate([self._jacobian, last[:, None]], axis=1)
 
 
 def _second_along(problem: Collocation, z: Array, along: Array) -> tuple[Array, Array]:
@@ -122,11 +137,6 @@ def _second_along(problem: Collocation, z: Array, along: Array) -> tuple[Array, 
         sides.append(np.concatenate([state.residual().imag, state.macroscopic().imag], axis=-1))
     both = (sides[0] - sides[1]) / (2.0 * _DIFFERENCE * IMAGINARY_STEP)
     return both[:, :-4], both[:, -4:]
-
-
-def _with_row(jacobian: Array, gradient: Array, row: Array) -> Array:
-    last = np.einsum("kq,kqn->kn", row, gradient[:, LOG_M:])
-    return np.concatenate([jacobian, last[:, None]], axis=1)
 
 
 def directions(plane: Array) -> Array:

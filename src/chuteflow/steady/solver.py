@@ -63,13 +63,18 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended."""
+    """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended.
+
+    ``response`` (4,) is their derivative along the branch with respect to the value of the condition, to a few digits;
+    None where no condition was solved for.
+    """
 
     problem: Collocation
     z: Array
     macroscopic: Array
     error: float
     status: Status
+    response: Array | None = None
 
     @property
     def converged(self) -> bool:
@@ -132,10 +137,10 @@ def _solve(problem: Collocation, z: Array, weights: Array, value: Array, toleran
         if not finer_degrees:
             return Solution(problem, z, coarse, np.inf, Status.UNRESOLVED)
         problem, z = prolong(problem, z, finer_degrees.pop(0))
-        z, fine, change, noise = _refined(problem, z, weights, value, coarse)
+        z, fine, change, noise, response = _refined(problem, z, weights, value, coarse)
         error = np.maximum(change, noise)
         if change < max(tolerance, noise):
-            return Solution(problem, z, fine, float(error), Status.CONVERGED)
+            return Solution(problem, z, fine, float(error), Status.CONVERGED, response)
 
 
 def in_parts(members: list[Item]) -> Iterator[list[Item]]:
@@ -191,7 +196,7 @@ def _side_by_side(
                 break
         coarse = together.state(z).macroscopic()
         together, z = prolong(together, z, finer)
-        z, fine, change, noise = _refined(together, z, weights, value, coarse)
+        z, fine, change, noise, response = _refined(together, z, weights, value, coarse)
         error = np.maximum(change, noise)
     onward: dict[int, tuple[Collocation, Array]] = {}
     for row, i in enumerate(members):
@@ -199,7 +204,7 @@ def _side_by_side(
             continue
         problem = Collocation(model, finer, starts[i][0].stretch)
         if change[row] < max(tolerance, noise[row]):
-            out[i] = Solution(problem, z[row], fine[row], float(error[row]), Status.CONVERGED)
+            out[i] = Solution(problem, z[row], fine[row], float(error[row]), Status.CONVERGED, response[row])
         elif np.isfinite(z[row]).all():
             onward[i] = (problem, z[row])
     return onward
@@ -207,18 +212,18 @@ def _side_by_side(
 
 def _refined(
     problem: Collocation, z: Array, weights: Array, value: Array, coarse: Array
-) -> tuple[Array, Array, Array, Array]:
-    """One Newton step on a finer grid: unknowns, macroscopic quantities, their change, and what rounding of
-    the residuals and of the tabulated closures can do to them."""
+) -> tuple[Array, Array, Array, Array, Array]:
+    """One Newton step on a finer grid: unknowns, macroscopic quantities, their change, what rounding of the
+    residuals and of the tabulated closures can do to them, and what a change of the condition's value does."""
     state = problem.state(z)
     f, jacobian = _system(state, weights, value)
     z = z - solve_each(jacobian, f[..., None])[..., 0]
     fine = problem.state(z).macroscopic()
     change = np.abs(fine - coarse)[..., :LOG_T].max(axis=-1)
-    gradient = np.swapaxes(state.macroscopic_gradient()[..., :LOG_T, :], -1, -2)
+    gradient = np.swapaxes(state.macroscopic_gradient(), -1, -2)
     adjoint = solve_each(np.swapaxes(jacobian, -1, -2), gradient)
-    sensitivity = np.abs(adjoint).sum(axis=-2).max(axis=-1)
-    return z, fine, change, np.maximum(_FLOOR, _NOISE * sensitivity)
+    sensitivity = np.abs(adjoint[..., :LOG_T]).sum(axis=-2).max(axis=-1)
+    return z, fine, change, np.maximum(_FLOOR, _NOISE * sensitivity), adjoint[..., -1, :]
 
 
 def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
@@ -227,15 +232,13 @@ def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) 
     return solve(*prolong(near.problem, near.z, coarser), condition, tolerance)
 
 
-def between(one: Solution, other: Solution, share: float) -> tuple[Collocation, Array]:
-    """Where to start from for a flow ``share`` of the way from ``one`` to ``other``, one grid coarser."""
+def alike(one: Solution, other: Solution) -> tuple[Collocation, Array, Array]:
+    """Two flows on the grid of the first, one degree coarser: where to start from for flows between them."""
     coarser = max(d for d in DEGREES if d < max(one.problem.degree, DEGREES[1]))
     problem, matrix = one.problem.transferred(coarser)
-    degree, stretch = problem.degree, problem.stretch
-    _, other_matrix = other.problem.transferred(degree, stretch)
+    _, other_matrix = other.problem.transferred(problem.degree, problem.stretch)
     z = np.concatenate([matrix @ one.z[:-2], one.z[-2:]])
-    other_z = np.concatenate([other_matrix @ other.z[:-2], other.z[-2:]])
-    return problem, z + share * (other_z - z)
+    return problem, z, np.concatenate([other_matrix @ other.z[:-2], other.z[-2:]])
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
