@@ -43,8 +43,8 @@ _ALONG = 0.6
 _SAFETY, _SMALL, _NOISE = 4.0, 0.1, 8.0
 #: How often a stretch is halved. A chord of 0.5 is then as short as 5e-4.
 _HALVINGS = 10
-#: An m' below this share of the chord is rounding.
-_FLAT = 1e-10
+#: An m' below this tells nothing of a turn; and turns are none whose values differ by less, or by their errors.
+_FLAT, _LEAST = 1e-8, 1e-11
 #: A place is known after a step of Newton's below this, in sigma, and before one below the second; a bracket ends when
 #: it is shorter than the third.
 _CLOSE, _LOST, _SMALLEST, _MOST_STEPS = 1e-6, 1e-9, 1e-12, 60
@@ -148,7 +148,7 @@ def directions(plane: Array) -> Array:
 
 def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Turn]:
     """Every flow between the first and the last of ``path``, successive flows of one branch, at which one of the
-    quantities ``which`` turns, in order along it.
+    quantities ``which`` turns, in order along it; but turns that differ by rounding alone.
 
     Raises:
         SolveError: where the branch could not be followed to one.
@@ -162,7 +162,37 @@ def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOL
         for i in np.flatnonzero(models.open(which)).tolist()
         for quantity, place, solution in _between(at[i], at[i + 1], which, tolerance, _HALVINGS)
     ]
-    return sorted(found, key=lambda turn: turn.place)
+    found.sort(key=lambda turn: turn.place)
+    told = [turn for quantity in which for turn in _told([t for t in found if t.which == quantity], path)]
+    return sorted(told, key=lambda turn: turn.place)
+
+
+def _told(turns: list[Turn], path: Sequence[Solution]) -> list[Turn]:
+    """The turns of one quantity without those that its errors may have made."""
+    if not turns:
+        return []
+    which = turns[0].which
+    stops = [path[0], *(turn.solution for turn in turns), path[-1]]
+    errors = [0.0, *(turn.solution.error for turn in turns), 0.0]
+    values = [float(stop.macroscopic[which]) for stop in stops]
+    kept = distinct(values, [max(_LEAST, one + other) for one, other in pairwise(errors)])
+    return [turns[i - 1] for i in kept[1:-1]]
+
+
+def distinct(values: Sequence[float], least: Sequence[float]) -> list[int]:
+    """Of ``values`` (k,) of a quantity at the ends of a path and at its turns, the places of the ends, and of those
+    turns that are told from their neighbours: by more than ``least`` (k-1,), from each to the next."""
+    kept, gaps = list(range(len(values))), list(least)
+    while len(kept) > 2:
+        apart = [abs(values[j] - values[i]) - gap for i, j, gap in zip(kept[:-1], kept[1:], gaps, strict=True)]
+        nearest = int(np.argmin(apart))
+        if apart[nearest] > 0.0:
+            break
+        # Two turns that are one value are none; at an end of the path the one next to it is none.
+        first, last = max(nearest, 1), min(nearest + 2, len(kept) - 1)
+        del kept[first:last]
+        gaps[first - 1 : last] = [max(gaps[first - 1 : last])]
+    return kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +242,7 @@ class Models:
         low[..., 2] -= _SAFETY * self.bump[:, which]
         high[..., 2] += _SAFETY * self.bump[:, which]
         monotonic = (low.min(axis=-1) > 0.0) | (high.max(axis=-1) < 0.0)
+        monotonic |= np.maximum(-low.min(axis=-1), high.max(axis=-1)) < _FLAT
         return (self.length > 0.0) & ~(self.sure & monotonic.all(axis=1))
 
 
@@ -232,7 +263,7 @@ def _between(
     if not models.open(which)[0]:
         return
     chord = Chord(first.solution, last.solution, tolerance)
-    brackets = {quantity: _brackets(models, quantity) for quantity in which}
+    brackets = {quantity: _brackets(models, quantity) for quantity in which if models.open((quantity,))[0]}
     if models.sure[0] and all(found is not None for found in brackets.values()):
         located = [
             (quantity, _located(chord, quantity, bracket))
@@ -274,10 +305,9 @@ def _brackets(models: Models, which: int) -> list[Bracket] | None:
     values = np.polyval(quartic, stops)
     values[0], values[-1] = b[0], b[-1]
     unknown = _SAFETY * models.bump[0, which] * 6.0 * (stops * (1.0 - stops)) ** 2
-    flat = _FLAT * models.length[0]
     if (np.abs(values) < unknown).any():
         return None
-    told = (np.abs(values) > flat) | (stops == 0.0) | (stops == 1.0)
+    told = (np.abs(values) > _FLAT) | (stops == 0.0) | (stops == 1.0)
     stops, values = stops[told], values[told]
     changes = np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0))
     zeros = np.roots(quartic).real
@@ -348,14 +378,14 @@ def find_zero(
 
 
 def may_turn(slope: Array, noise: Array | float = 0.0) -> NDArray[np.bool_]:
-    """Whether a quantity may turn in the steps of a rough path, or in those beside them, given its ``slope`` (k, ...)
-    in each by differences, which are known to ``noise``; NaN where a step is missing.
+    """Whether a quantity may turn in the steps of a rough path, given its ``slope`` (k, ...) in each by differences,
+    which are known to ``noise``; NaN where a step is missing.
 
     So it may where the slope changes as much from step to step as it is large: then it, or within the step its own
-    turn, may have reached zero.
+    turn, may have reached zero. A step without neighbours tells nothing, and it may turn there.
     """
     change = np.abs(np.diff(slope, axis=0))
-    none = np.zeros_like(slope[:1])
+    none = np.full_like(slope[:1], np.nan)
     beside = np.fmax(np.concatenate([none, change]), np.concatenate([change, none]))
     with np.errstate(invalid="ignore"):
-        return np.abs(slope) <= beside + noise
+        return ~(np.abs(slope) > beside + noise) & np.isfinite(slope)
