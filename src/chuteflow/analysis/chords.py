@@ -1,32 +1,39 @@
-"""The stretch of a branch between two solved flows, cut by planes across the chord between them.
+"""The stretch of a branch between two solved flows, cut across the chord between them.
 
-# notation: sigma runs from 0 to 1 along the chord between two flows in the plane (ln M, ln T_surface).
+# notation: sigma runs from 0 to 1 along the chord.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, Collocation
-from chuteflow.steady.solver import TOLERANCE, Condition, Solution, alike, solve
+from chuteflow.steady.solver import TOLERANCE, Condition, Solution, Status, alike, solve
 
 #: A chord is searched until sigma is known to this.
 _CLOSE = 1e-9
+#: Where the solver does not converge it starts from nearer flows, found so many times half-way.
+_NEARER = 3
 
 
 class Chord:
-    """The stretch of a family between two solved flows, as a function of sigma."""
+    """The stretch of a family between two solved flows, as a function of sigma.
 
-    def __init__(self, first: Solution, last: Solution, tolerance: float = TOLERANCE) -> None:
-        chord = (last.macroscopic - first.macroscopic)[LOG_M:]
-        weights = chord / float(chord @ chord)
-        #: d sigma over d (ln M, ln T_surface)
-        self.row = (float(weights[0]), float(weights[1]))
-        self._begin = float(weights @ first.macroscopic[LOG_M:])
+    The chord lies in the plane (ln M, ln T_surface); in the space of all four quantities if ``in_space``, for families
+    that hardly move in the plane where deep flows change near the base alone.
+    """
+
+    def __init__(
+        self, first: Solution, last: Solution, tolerance: float = TOLERANCE, *, in_space: bool = False
+    ) -> None:
+        chord = last.macroscopic - first.macroscopic
+        if not in_space:
+            chord[:LOG_M] = 0.0
+        #: d sigma over d (ln Q, ln h, ln M, ln T_surface), (4,)
+        self.row: Array = chord / float(chord @ chord)
+        self._begin = float(self.row @ first.macroscopic)
         self._known = [(0.0, first), (1.0, last)]
         self._alike: dict[tuple[float, float], tuple[Collocation, Array, Array]] = {}
         self._tolerance = tolerance
@@ -37,19 +44,27 @@ class Chord:
         Raises:
             SolveError: where the solver does not converge.
         """
+        return self._at(sigma, _NEARER)
+
+    def _at(self, sigma: float, nearer: int) -> Solution:
         solution = solve(*self.start_at(sigma), self.condition_at(sigma), self._tolerance)
+        if solution.status is Status.NO_CONVERGENCE and nearer:
+            nearest = min((known for known, _ in self._known), key=lambda known: abs(known - sigma))
+            self._at(0.5 * (nearest + sigma), nearer - 1)
+            return self._at(sigma, nearer - 1)
         if not solution.converged:
             raise SolveError(f"a family of flows could not be followed: {solution.status.value}")
         self._known.append((sigma, solution))
         return solution
 
     def condition_at(self, sigma: float) -> Condition:
-        """The plane at ``sigma`` normal to the chord."""
-        return Condition((0.0, 0.0, *self.row), self._begin + sigma)
+        """What holds at ``sigma``, in the plane or space normal to the chord."""
+        flux, height, mass, temperature = self.row.tolist()
+        return Condition((flux, height, mass, temperature), self._begin + sigma)
 
     def place(self, solution: Solution) -> float:
         """sigma of a flow."""
-        return float(np.array(self.row) @ solution.macroscopic[LOG_M:]) - self._begin
+        return float(self.row @ solution.macroscopic) - self._begin
 
     def start_at(self, sigma: float) -> tuple[Collocation, Array]:
         """Where the solver may start from at ``sigma``: between the nearest flows known."""

@@ -102,7 +102,8 @@ def crossings(
             yield _at_turn(turn.exact, path.knots, which, off)
     yield from _from_rough(rough, which, value, tolerance)
     for one, other in exact:
-        assert one.exact is not None and other.exact is not None
+        assert one.exact is not None
+        assert other.exact is not None
         yield _on_stretch(one.exact, other.exact, which, value, tolerance)
 
 
@@ -152,7 +153,7 @@ def _with_turns(path: _Path, which: int, target: float) -> _Path:
 
 def _kept(path: _Path) -> NDArray[np.intp]:
     """Knots with both ends, of rough ones that are near to each other only the first."""
-    lengths = np.hypot(*np.diff(path.macroscopic[:, LOG_M:], axis=0).T)
+    lengths = np.linalg.norm(np.diff(path.macroscopic, axis=0), axis=1)
     place = np.floor(np.append(0.0, np.cumsum(lengths)) / _TOO_NEAR)
     kept = np.append(True, place[1:] != place[:-1])
     kept |= np.array([knot.exact is not None for knot in path.knots])
@@ -165,7 +166,7 @@ def _near_turns(macroscopic: Array, which: int, target: float) -> NDArray[np.boo
     off = macroscopic[:, which] - target
     if len(off) < 2:
         return np.zeros(0, dtype=bool)
-    gain, length = np.diff(off), np.maximum(np.hypot(*np.diff(macroscopic[:, LOG_M:], axis=0).T), 1e-12)
+    gain, length = np.diff(off), np.maximum(np.linalg.norm(np.diff(macroscopic, axis=0), axis=1), 1e-12)
     bend = np.concatenate([[0.0], np.abs(np.diff(gain)), [0.0]])
     reach = NEAR + np.maximum(bend[1:], bend[:-1])
     near = (np.minimum(off[1:], off[:-1]) < reach) & (np.maximum(off[1:], off[:-1]) > -reach)
@@ -230,9 +231,7 @@ def _passes(a: Knot, b: Knot, which: int, solution: Solution) -> bool:
     return bool(float(solution.response[LOG_M:] @ gain[LOG_M:]) * float(gain[which]) > 0.0)
 
 
-def _bracketed(
-    a: Knot, b: Knot, which: int, value: float, direct: Solution, tolerance: float
-) -> Iterator[Solution]:
+def _bracketed(a: Knot, b: Knot, which: int, value: float, direct: Solution, tolerance: float) -> Iterator[Solution]:
     """The flows between two knots, by their exact turns; where only the roughness of the knots put one there, the
     solution ``direct``, if it is one."""
     ends = solved_path([a, b])
@@ -257,7 +256,7 @@ def _on_stretch(first: Solution, last: Solution, which: int, value: float, toler
     found along the branch is as good: its error counts what the quantity is off, or may be, by how far the flow moves.
     """
     target = float(np.log(value))
-    chord = Chord(first, last)
+    chord = Chord(first, last, in_space=True)
     off = float(first.macroscopic[which]) - target, float(last.macroscopic[which]) - target
 
     def excess(solution: Solution) -> tuple[float, float]:
@@ -277,18 +276,19 @@ def _on_stretch(first: Solution, last: Solution, which: int, value: float, toler
 def _at_turn(turn: Solution, knots: Sequence[Knot], which: int, off: float) -> Solution:
     """The flow at a turn as one whose quantity is ``off`` by no more than rounding."""
     i = next(i for i, knot in enumerate(knots) if knot.exact is turn)
-    beside = [knots[j].exact for j in (i - 1, i + 1)]
-    assert beside[0] is not None and beside[1] is not None
-    return _with_error_of(turn, Chord(beside[0], beside[1]), which, off)
+    before, after = knots[i - 1].exact, knots[i + 1].exact
+    assert before is not None
+    assert after is not None
+    return _with_error_of(turn, Chord(before, after, in_space=True), which, off)
 
 
 def _with_error_of(solution: Solution, chord: Chord, which: int, off: float) -> Solution:
     """A flow of a chord, with the error that it has as one at a value of a quantity that is ``off``."""
     first, second = along(chord, solution)
     off = off + max(solution.error, _FLOOR)
-    slope, bend = abs(float(first[which])), abs(float(second[which]))
+    slope, bend = np.abs([first[which], second[which]])
     with np.errstate(divide="ignore", invalid="ignore"):
         # Where m = m' d + m'' d^2/2 is off, so far is the flow at most.
-        far = float(np.fmin(2.0 * off / np.float64(slope), slope / np.float64(bend) + np.sqrt(2.0 * off / np.float64(bend))))
+        far = float(np.fmin(2.0 * off / slope, slope / bend + np.sqrt(2.0 * off / bend)))
     moved = float(np.abs(first[:LOG_T]).max()) * far + 0.5 * float(np.abs(second[:LOG_T]).max()) * far**2
     return replace(solution, error=solution.error + moved, status=Status.CONVERGED)

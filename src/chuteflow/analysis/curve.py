@@ -7,7 +7,7 @@ them whole, or followed through folds in Q, M and T_surface by the general conti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 
 #: Quantities whose folds are located.
 _FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
@@ -94,9 +94,7 @@ def _branch(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: flo
     return Branch(tuple(flows), tuple(special), stretch.ends)
 
 
-def _folds(
-    chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float
-) -> Iterator[tuple[str, Flow, float]]:
+def _folds(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which Q, M or T_surface turns, with their arclengths."""
     path, at = family.path(stretch)
     kinds = {which: kind for kind, which in _FOLDS.items()}

@@ -1,15 +1,15 @@
 """Where ln Q, ln h, ln M and ln T_surface turn along a branch of flows.
 
 # notation: F(z) = 0 the steady problem, m one of the four quantities, sigma runs from 0 to 1 along the chord between
-# two flows in the plane (ln M, ln T_surface), w the row that takes d(ln M, ln T_surface) to d sigma.
+# two flows in the space of these, w the gradient of sigma in z.
 
 Between two solved flows nothing is taken to be monotonic. At either end the derivatives along the branch are exact:
 
     [F_z; w] z' = [0; 1],    [F_z; w] z'' = -[F_zz; w_z] z' z',    m' = m_z z',    m'' = m_z z'' + m_zz z' z'.
 
-The four numbers m', m'' at both ends give a cubic for m' between them; its integral must be the difference of m. What is missing there is added as a
-bump, and tells how far the model can be trusted: where it leaves open whether m' has a zero, or a pair of them, as
-two folds just past a cusp are, the stretch is halved.
+The four numbers m', m'' at both ends give a cubic for m' between them; its integral must be the difference of m.
+What is missing there is added as a bump, and tells how far the model can be trusted: where it leaves open whether m'
+has a zero, or a pair of them, as two folds just past a cusp are, the stretch is halved.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class Turn:
 
 
 def expansions(solutions: Sequence[Solution], ahead: Array) -> list[Expansion]:
-    """The expansions of flows of one chute, where their branch goes about ``ahead`` (k, 2) (d ln M, d ln T_surface)."""
+    """The expansions of flows of one chute, where their branch goes about ``ahead`` (k, 4), a direction in the space
+    of the quantities."""
     out: dict[int, Expansion] = {}
     for members in _alike(solutions):
         local = _Local([solutions[i] for i in members], ahead[members])
@@ -105,11 +106,11 @@ class _Local:
             for _ in range(_ROWS_TRIED):
                 self._along = solve_each(self._bordered(), self._side)[..., 0]
                 self.first = np.einsum("kqn,kn->kq", self._gradient, self._along)
-                length = np.hypot(*self.first[:, LOG_M:].T)
-                off = length > _OFF_ROW * np.hypot(*self._row.T)
+                length = np.linalg.norm(self.first, axis=1)
+                off = length > _OFF_ROW
                 if not off.any():
                     break
-                self._row = np.where(off[:, None], self.first[:, LOG_M:] / length[:, None], self._row)
+                self._row = np.where(off[:, None], self.first / length[:, None], self._row)
 
     @property
     def second(self) -> Array:
@@ -117,12 +118,12 @@ class _Local:
         with np.errstate(all="ignore"):
             bent, turned = _second_along(self._problem, self._z, self._along)
             self._side[:, :-1, 0] = -bent
-            self._side[:, -1, 0] = -(self._row * turned[:, LOG_M:]).sum(axis=-1)
+            self._side[:, -1, 0] = -(self._row * turned).sum(axis=-1)
             bend = solve_each(self._bordered(), self._side)[..., 0]
         return np.einsum("kqn,kn->kq", self._gradient, bend) + turned
 
     def _bordered(self) -> Array:
-        last = np.einsum("kq,kqn->kn", self._row, self._gradient[:, LOG_M:])
+        last = np.einsum("kq,kqn->kn", self._row, self._gradient)
         return np.concatenate([self._jacobian, last[:, None]], axis=1)
 
 
@@ -139,11 +140,11 @@ def _second_along(problem: Collocation, z: Array, along: Array) -> tuple[Array, 
     return both[:, :-4], both[:, -4:]
 
 
-def directions(plane: Array) -> Array:
-    """Unit vectors (k, 2) along a path (k, 2), by the points to either side of each."""
-    ahead = np.gradient(plane, axis=0)
-    length = np.hypot(*ahead.T)[:, None]
-    return np.where(length > 0.0, ahead / np.where(length > 0.0, length, 1.0), np.array([1.0, 0.0]))
+def directions(path: Array) -> Array:
+    """Unit vectors along a path of points, an array (k, d), by the points to either side of each."""
+    ahead = np.gradient(path, axis=0)
+    length = np.linalg.norm(ahead, axis=1, keepdims=True)
+    return np.where(length > 0.0, ahead / np.where(length > 0.0, length, 1.0), np.eye(path.shape[1])[-1])
 
 
 def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Turn]:
@@ -155,7 +156,7 @@ def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOL
     """
     if len(path) < 2:
         return []
-    at = expansions(path, directions(np.array([s.macroscopic[LOG_M:] for s in path])))
+    at = expansions(path, directions(np.array([s.macroscopic for s in path])))
     models = Models.between(at[:-1], at[1:])
     found = [
         Turn(quantity, i + place, solution)
@@ -211,12 +212,12 @@ class Models:
         """The models between flows ``first`` (k) and ``last`` (k)."""
         ends = [np.array([e.solution.macroscopic for e in part]) for part in (first, last)]
         gain = ends[1] - ends[0]
-        length = np.hypot(*gain[:, LOG_M:].T)
-        row = gain[:, LOG_M:] / np.where(length > 0.0, length, 1.0)[:, None] ** 2
+        length = np.linalg.norm(gain, axis=1)
+        row = gain / np.where(length > 0.0, length, 1.0)[:, None] ** 2
         with np.errstate(all="ignore"):
             begin, end = _over_sigma(first, row), _over_sigma(last, row)
             # Cosine of the angle to the chord: d sigma per arclength, times the chord.
-            cosines = [length / np.hypot(*part[0][:, LOG_M:].T) for part in (begin, end)]
+            cosines = [length / np.linalg.norm(part[0], axis=1) for part in (begin, end)]
             forward = [np.isfinite(part[0]).all(axis=1) & (part[2] > 0.0) for part in (begin, end)]
             whole = 0.5 * (begin[0] + end[0]) + (begin[1] - end[1]) / 12.0
             bump = 5.0 * (gain - whole)  # in the middle coefficient; 3/8 of it in m'
@@ -230,8 +231,8 @@ class Models:
                 ],
                 axis=-1,
             )
-            noise = 5.0 * _NOISE * np.array([a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)])
-            unknown = np.maximum(np.abs(bump) - noise[:, None], 0.0)
+            errors = [a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)]
+            unknown = np.maximum(np.abs(bump) - 5.0 * _NOISE * np.array(errors)[:, None], 0.0)
             size = np.maximum(np.abs(slope).max(axis=-1), length[:, None])
             sure = (unknown < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG) & forward[0] & forward[1]
         return cls(slope, unknown, length, sure)
@@ -247,10 +248,10 @@ class Models:
 
 
 def _over_sigma(at: Sequence[Expansion], row: Array) -> tuple[Array, Array, Array]:
-    """First and second derivatives (k, 4) with respect to sigma, which ``row`` (k, 2) gives, and that of sigma (k,)."""
+    """First and second derivatives (k, 4) with respect to sigma, which ``row`` (k, 4) gives, and that of sigma (k,)."""
     first, second = np.array([e.first for e in at]), np.array([e.second for e in at])
-    pace = (row * first[:, LOG_M:]).sum(axis=1)
-    bend = (row * second[:, LOG_M:]).sum(axis=1)
+    pace = (row * first).sum(axis=1)
+    bend = (row * second).sum(axis=1)
     slope = first / pace[:, None]
     return slope, (second - slope * bend[:, None]) / pace[:, None] ** 2, pace
 
@@ -262,7 +263,7 @@ def _between(
     models = Models.between([first], [last])
     if not models.open(which)[0]:
         return
-    chord = Chord(first.solution, last.solution, tolerance)
+    chord = Chord(first.solution, last.solution, tolerance, in_space=True)
     brackets = {quantity: _brackets(models, quantity) for quantity in which if models.open((quantity,))[0]}
     if models.sure[0] and all(found is not None for found in brackets.values()):
         located = [
@@ -276,8 +277,7 @@ def _between(
     if not halvings:
         raise SolveError("a branch turns too sharply to tell its turning points: narrow the range searched")
     middle = chord.at(0.5)
-    ahead = (last.solution.macroscopic - first.solution.macroscopic)[None, LOG_M:]
-    (between,) = expansions([middle], ahead / np.hypot(*ahead.T)[:, None])
+    (between,) = expansions([middle], _unit(chord))
     for quantity, place, turn in _between(first, between, which, tolerance, halvings - 1):
         yield quantity, 0.5 * place, turn
     for quantity, place, turn in _between(between, last, which, tolerance, halvings - 1):
@@ -344,9 +344,12 @@ def _located(chord: Chord, which: int, bracket: Bracket) -> tuple[float, Solutio
 
 def along(chord: Chord, solution: Solution) -> tuple[Array, Array]:
     """First and second derivatives (4,) of the quantities with respect to sigma at a flow of the stretch."""
-    row = np.array([chord.row])
-    first, second, _ = _over_sigma(expansions([solution], row / np.hypot(*row.T)[:, None]), row)
+    first, second, _ = _over_sigma(expansions([solution], _unit(chord)), chord.row[None])
     return first[0], second[0]
+
+
+def _unit(chord: Chord) -> Array:
+    return chord.row[None] / np.linalg.norm(chord.row)
 
 
 def find_zero(

@@ -73,7 +73,7 @@ def limits(found: BoundarySet) -> list[Boundary]:
                 w = np.append(solution.z, value)
                 system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
                 point = solved(system, w, HELD, value, found.tolerance)
-                if not any(line.holds(point, found.tolerance) for line in lines):
+                if not any(line.holds(point) for line in lines):
                     lines.append(traced(point, wider, found.tolerance))
         out += [as_boundary("limit", found.second, line) for line in lines]
     return out
