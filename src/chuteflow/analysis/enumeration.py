@@ -7,6 +7,7 @@ misses none. Along each, the flows that meet the condition are where the quantit
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +90,7 @@ def flows(
         reason=None
         if search.solutions
         else reason_for_none(problem, [f.macroscopic for f in search.families], which, value, search.within),
+        incomplete=_left_out(search, which, value),
     )
 
 
@@ -125,23 +127,51 @@ def _asked(given: dict[str, float | None]) -> tuple[int, float]:
     return _QUANTITIES[name], value
 
 
-def _wider(search: _Search, which: int, value: float) -> Range:
-    """The range with which families that lead out of it towards ``value`` reach it."""
+@dataclass(frozen=True)
+class _Lead:
+    """Where a family leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
+    LOG_T or LOG_M, there to reach the value at about ``place``, a logarithm."""
+
+    axis: int
+    edge: int
+    place: float
+
+
+def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
     target = float(np.log(value))
-    within = wider = search.within
-    deeper = sum(family.traced for family in search.families) <= _MOST_DEEPER
-    axes = (LOG_T, LOG_M) if deeper else (LOG_T,)
     for family in search.families:
         m = family.macroscopic
         for end, before in ((m[0], m[1]), (m[-1], m[-2])) if len(m) > 1 else ():
             left = target - float(end[which])
-            for axis in axes:
-                edge = within.edge(end, axis)
+            for axis in (LOG_T, LOG_M):
+                edge = search.within.edge(end, axis)
                 run = float(end[axis] - before[axis])
                 slope = float(end[which] - before[which]) / run if run else 0.0
                 if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
-                    reach = np.clip(float(end[axis]) + 1.2 * left / slope + edge, -600.0, 600.0)
-                    wider = wider.reaching(axis, float(np.exp(reach)))
+                    yield _Lead(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
+
+
+def _left_out(search: _Search, which: int, value: float) -> str | None:
+    """Which family was not followed to where it may have the value, in words."""
+    for lead in _leads(search, which, value):
+        if lead.axis == LOG_M:
+            there = f"hold-ups above {search.within.deepest:g}"
+        elif lead.edge > 0:
+            there = f"surface temperatures above {search.within.hottest:g}"
+        else:
+            there = f"surface temperatures below {search.within.coldest:g}"
+        return f"a branch goes on to {there}, outside the range searched"
+    return None
+
+
+def _wider(search: _Search, which: int, value: float) -> Range:
+    """The range with which families that lead out of it towards ``value`` reach it."""
+    within = wider = search.within
+    deeper = sum(family.traced for family in search.families) <= _MOST_DEEPER
+    axes = (LOG_T, LOG_M) if deeper else (LOG_T,)
+    for lead in _leads(search, which, value):
+        if lead.axis in axes:
+            wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))
     # The rough end of a family may have passed the value inside the range, and the flow itself not.
     for solution in search.beyond:
         for axis in axes:

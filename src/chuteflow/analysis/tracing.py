@@ -12,7 +12,7 @@ import numpy as np
 
 from chuteflow.analysis.chords import Chord
 from chuteflow.analysis.crossings import Knot
-from chuteflow.analysis.ranges import Range
+from chuteflow.analysis.ranges import CLOSED, Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.numerics.continuation import Control, Point, trace
@@ -314,7 +314,7 @@ def _side(start: Solution, ahead: Array, within: Range, control: Control) -> tup
                 solutions[-1] = _at_edge(solutions[-2], solutions[-1], axis, edge)
             return solutions, words, False
         if len(points) > 3 and _returned(points):
-            return solutions[:-1], "the family closes on itself", True
+            return solutions[:-1], CLOSED, True
         if _decay(solutions[-1]) > _LOST:
             return solutions, LOST, False
     return solutions, LOST if solutions[-1].problem.degree == DEGREES[-1] else path.status.value, False
