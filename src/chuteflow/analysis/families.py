@@ -5,19 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from chuteflow.analysis.paths import Chord, Point, Turn, find_value, point_at, refined, turns
-from chuteflow.analysis.ranges import Range
+from chuteflow.analysis.ranges import CLOSED, Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.steady.model import Model
-from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve, solve
+from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has turned
@@ -29,13 +28,15 @@ _SHARP = 0.8
 #: A solved flow lies within this of the rough one, and this fraction of the spacing.
 _ROUGH, _ASTRAY = 0.03, 0.3
 #: Where a rough quantity comes as near to the value asked for, the branch is solved there.
-NEAR = 0.03
+NEAR = 0.01
 #: One flow is solved at once where the quantity changes by more than this along the branch, per length.
 _STEEP = 0.15
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
 _AT_EDGE = 1e-6
-#: Branches whose points differ by less are one.
+#: Points that differ by less are one.
 _SAME = 1e-8
+#: Why a branch ends where it is lost.
+LOST = "it could not be followed further"
 #: Searches whose result is remembered.
 _REMEMBERED = 4
 
@@ -91,21 +92,49 @@ class Family:
             return None
         return point
 
+    def _solved_from(self, begin: int, end: int, tolerance: float) -> list[Point]:
+        found: list[Point] = []
+        for i in self._spaced(begin, end):
+            point = self.solved(i, tolerance)
+            if point is not None and not (found and _is_behind(point, found[-1])):
+                found.append(point)
+        return found
+
     def points(self, begin: int, end: int, tolerance: float) -> list[Point]:
         """Points from rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
-        found: list[Point] = []
-        places = self._spaced(begin, end)
-        for i in places:
-            point = self.solved(i, tolerance)
-            if point is not None and not (found and _is_behind(point, found[-1])):
-                found.append(point)
+        found = self._solved_from(begin, end, tolerance)
         if not found:
             raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
         return refined(found, tolerance)
+
+    def traced(self, tolerance: float) -> list[TracedFamily]:
+        """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
+        inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
+        if len(inside) < 2:
+            return []
+        found = self._solved_from(int(inside[0]), int(inside[-1]), tolerance)
+        if self.rough.closed and found:
+            found.append(found[0])
+        pieces: list[list[Point]] = [found[:1]]
+        for one, other in pairwise(found):
+            try:
+                pieces[-1] += refined([one, other], tolerance)[1:]
+            except SolveError:
+                pieces.append([other])
+        ends = [LOST] * (2 * len(pieces))
+        if self.rough.closed and len(pieces) == 1:
+            ends = [CLOSED, CLOSED]
+        elif found:
+            ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
+        return [
+            TracedFamily(tuple(piece), (begin, end))
+            for piece, begin, end in zip(pieces, ends[::2], ends[1::2], strict=True)
+            if len(piece) > 1
+        ]
 
     def _spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
@@ -273,18 +302,4 @@ class TracedFamily:
 
 def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
     """Every branch of flows in the range, solved from end to end."""
-    found = []
-    for family in families(model, within):
-        inside = np.flatnonzero([within.contains(m) for m in family.macroscopic])
-        if len(inside) < 2:
-            continue
-        begin, end = int(inside[0]), int(inside[-1])
-        points = family.points(begin, end, tolerance)
-        if family.rough.closed:
-            points = refined([*points, points[0]], tolerance)
-            ends = ("the branch closes on itself",) * 2
-        else:
-            ends = within.end_words(points[0].m), within.end_words(points[-1].m)
-        if len(points) > 1:
-            found.append(TracedFamily(tuple(points), ends))
-    return found
+    return [piece for family in families(model, within) for piece in family.traced(tolerance)]

@@ -65,6 +65,26 @@ def point_at(start: Elements, weights: Array, value: float, tolerance: float) ->
     return Point(solution, solution.rates / length) if np.isfinite(length) else None
 
 
+def _point_between(first: Solution, last: Solution, sigma: float, tolerance: float) -> Point | None:
+    chord = last.macroscopic - first.macroscopic
+    direction = chord / np.linalg.norm(chord)
+    value = float(direction @ (first.macroscopic + sigma * chord))
+    return point_at(between(first, last, sigma), direction, value, tolerance)
+
+
+def solve_between(first: Solution, last: Solution, fraction: float, tolerance: float = TOLERANCE) -> Solution:
+    """The flow at a ``fraction`` of the chord between two neighbours of a branch, or a little beyond, in the plane normal
+    to it.
+
+    Raises:
+        SolveError: where it is not found.
+    """
+    point = _point_between(first, last, fraction, tolerance)
+    if point is None:
+        raise SolveError("a flow between two others of a branch could not be solved: ask for a larger tolerance")
+    return point.solution
+
+
 @dataclass(frozen=True, eq=False)
 class Chord:
     """The branch between two of its points."""
@@ -103,9 +123,7 @@ class Chord:
 
     def at(self, sigma: float) -> Point | None:
         """The point in the plane at ``sigma`` normal to the chord; None where none is found."""
-        start = between(self.first.solution, self.last.solution, sigma)
-        value = float(self.direction @ self.first.m) + sigma * self.length
-        return point_at(start, self.direction, value, self.tolerance)
+        return _point_between(self.first.solution, self.last.solution, sigma, self.tolerance)
 
     def slope(self, point: Point) -> Array:
         """Derivatives (4,) of the quantities with respect to sigma at a point."""
@@ -177,7 +195,7 @@ def turns(points: Sequence[Point], which: int, tolerance: float = TOLERANCE) -> 
     for i in range(len(points) - 1):
         chord = Chord(points[i], points[i + 1], tolerance)
         found += [Turn(which, i + place, point) for place, point in _turns(chord, which, _UNKNOWN)]
-        if 0 < i:
+        if i > 0:
             before, here, after = (float(point.tangent[which]) for point in points[i - 1 : i + 2])
             if abs(here) <= _FLAT < min(abs(before), abs(after)) and before * after < 0.0:
                 found.append(Turn(which, float(i), points[i]))
@@ -226,9 +244,7 @@ def find_value(chord: Chord, which: int, target: float) -> tuple[float, Point]:
     return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]))
 
 
-def find_zero(
-    chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]
-) -> tuple[float, Point]:
+def find_zero(chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]) -> tuple[float, Point]:
     """Where ``function`` of the flow vanishes along the chord, given its values of opposite sign at the ends."""
     return _located(chord, lambda point: (function(point.solution), None), ends)
 

@@ -15,6 +15,8 @@ SURFACE_TEMPERATURE = (1e-3, 1e5)
 LARGEST_HOLDUP = 30.0
 #: What can be searched at all.
 WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
+#: Why a branch ends for good, in words.
+VANISHES, CLOSED = "its hold-up vanishes", "the branch closes on itself"
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
 
@@ -92,25 +94,12 @@ class Range:
         if axis == LOG_M:
             if value == np.log(self.deepest):
                 return f"it goes on to hold-ups above {self.deepest:g}"
-            return "its hold-up vanishes"
+            return VANISHES
         if value == np.log(self.hottest):
             return f"it goes on to surface temperatures above {self.hottest:g}"
         return f"it goes on to surface temperatures below {self.coldest:g}"
 
-    def passed(self, macroscopic: Array) -> tuple[int, float, str]:
-        """Which edge a flow outside has passed: LOG_T or LOG_M, its value there, and in words."""
-        if macroscopic[LOG_M] > np.log(self.deepest):
-            return LOG_M, float(np.log(self.deepest)), f"it goes on to hold-ups above {self.deepest:g}"
-        if self.shallowest > 0.0 and macroscopic[LOG_M] < np.log(self.shallowest):
-            return LOG_M, float(np.log(self.shallowest)), "its hold-up vanishes"
-        if macroscopic[LOG_T] > np.log(self.hottest):
-            return (
-                LOG_T,
-                float(np.log(self.hottest)),
-                f"it goes on to surface temperatures above {self.hottest:g}",
-            )
-        return (
-            LOG_T,
-            float(np.log(self.coldest)),
-            f"it goes on to surface temperatures below {self.coldest:g}",
-        )
+
+def goes_on(words: str) -> bool:
+    """Whether a branch that ends with these words may have more flows beyond: it leaves the range, or is lost."""
+    return words not in (VANISHES, CLOSED)

@@ -27,7 +27,8 @@ class FlowSet(Sequence[Flow]):
     """Every flow that was asked for, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
-    ``reason`` is one sentence on why there is none, or None where there are flows.
+    ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where a branch
+    leaves the range searched towards what was asked for, so that there may be more, and None where none does.
     """
 
     chute: Chute
@@ -35,6 +36,7 @@ class FlowSet(Sequence[Flow]):
     searched: Searched
     tolerance: float
     reason: str | None
+    incomplete: str | None = None
 
     def __len__(self) -> int:
         return len(self.flows)

@@ -70,6 +70,8 @@ def head(result: Result) -> dict[str, Any]:
             "tolerance": result.tolerance,
             "reason": result.reason,
         }
+    if isinstance(result, FlowSet):
+        kept["incomplete"] = result.incomplete
     if isinstance(result, Curve):
         kept["ends"] = [list(branch.ends) for branch in result.branches]
     return kept
@@ -102,7 +104,7 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     if not 2 <= problem.degree <= _FINEST or z.shape != (problem.degree + 3,) or macroscopic.shape != (4,):
         raise InputError("a flow has the wrong number of unknowns")
     error = np.inf if kept["error"] is None else float(kept["error"])
-    solution = Solution(problem, z, macroscopic, error, Status[kept["status"]])
+    solution = Solution(macroscopic, error, Status[kept["status"]], (problem, z))
     if solution.converged:
         with np.errstate(all="ignore"):
             distance = np.abs(problem.state(z).macroscopic() - macroscopic).max()
@@ -129,7 +131,8 @@ def rebuilt(kept: dict[str, Any], found: Sequence[Row]) -> Result:
     low, high = kept["searched"]["surface_temperature"]
     searched = Searched((float(low), float(high)), float(kept["searched"]["largest_holdup"]))
     if kind == "flows":
-        return FlowSet(chute, tuple(row.flow for row in found), searched, float(kept["tolerance"]), kept["reason"])
+        told = float(kept["tolerance"]), kept["reason"], kept.get("incomplete")
+        return FlowSet(chute, tuple(row.flow for row in found), searched, *told)
     if kind != "curve":
         raise InputError(f"it holds an unknown kind of result, {kind!r}")
     branches = [

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.analysis.crossings import Chord
+from chuteflow.analysis.paths import solve_between
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability.verdict import Stability, stability_of
@@ -101,7 +101,7 @@ def flow_between(flows: Sequence[Flow], position: float) -> Flow:
     share = position - i
     if share in (0.0, 1.0):
         return last if share else first
-    return Flow(first.chute, Chord(first.solution, last.solution).at(share))
+    return Flow(first.chute, solve_between(first.solution, last.solution, share))
 
 
 def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> MarkedBranch:

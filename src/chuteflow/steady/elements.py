@@ -10,7 +10,7 @@ converge with twice that order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,9 +24,9 @@ from chuteflow.steady.model import CONDUCTION, Model
 
 #: Change of theta, and of y over its scale, on one element at most; and its longest part of the grid.
 _CHANGE, _CHANGE_OF_FLUX, _LONGEST = 1.0, 0.5, 0.26
-#: Degrees of Chebyshev grids for a flow, and the decay of the coefficients with which one resolves it.
+#: Degrees of Chebyshev grids for a flow, and the decay of the coefficients with which one may resolve it.
 DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
-_RESOLVED = 1e-13
+_ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
 #: Elements at most.
@@ -94,19 +94,20 @@ class Elements:
             lambda s: interpolation_matrix(problem.grid, s) @ theta_and_y,
         )
 
-    def collocated(self) -> tuple[Collocation, Array]:
-        """The problem on a Chebyshev grid that resolves the flow, of as low a degree as does, and its unknowns there.
+    def grids(self) -> Iterator[tuple[Collocation, Array]]:
+        """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to about
+        1e-8: between the ends of the elements the polynomials have no more digits.
 
-        A flow that no single grid resolves has one on each of some pieces.
+        Last comes one with a grid on each of some pieces.
         """
         for degree in DEGREES:
             problem = Collocation(self.model, degree, self.stretch)
             z, y = self._unknowns(problem)
-            if tail(problem.grid, np.stack([z[:-2], y]) + 1e-30) < _RESOLVED:
-                return problem, z
+            if tail(problem.grid, np.stack([z[:-2] / np.abs(z[:-2]).max(), y / np.abs(y).max()]) + 1e-30) < _ROUGHLY:
+                yield problem, z
         inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
-        return problem, self._unknowns(problem)[0]
+        yield problem, self._unknowns(problem)[0]
 
     def _unknowns(self, problem: Collocation) -> tuple[Array, Array]:
         """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""
@@ -154,16 +155,20 @@ class Elements:
         values = self.at(kernel.places(breaks, _GAUSS[0]))
         return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
 
-    def iterated(self, weights: Array, value: float, tolerance: float, most: int) -> Iterate:
+    def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
-        step is below ``tolerance``, or ``most`` steps."""
+        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is asked for."""
         ends, slopes = self.ends.copy(), self.slopes.copy()
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
+        errors = np.zeros((2 if rounding else 0, 4))
         mu, step = kernel.iterate(
             self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
             ends, slopes, self.log_mass, weights, value, tolerance, most, quantities, rates,
+            errors,
         )  # fmt: skip
-        return Iterate(Elements(self.model, self.stretch, self.breaks, ends, slopes, mu), quantities, rates, step)
+        return Iterate(
+            Elements(self.model, self.stretch, self.breaks, ends, slopes, mu), quantities, rates, errors, step
+        )
 
     def direction(self, weights: Array) -> tuple[Array, Elements] | None:
         """The change along the branch for which the macroscopic quantities, times ``weights`` (4,), change by 1.
@@ -193,10 +198,11 @@ class Elements:
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """What Newton's method came to: the flow, its ``quantities`` ln Q, ln h, ln M and ln T_surface (4,), their
-    ``rates`` with the value of the condition along the branch (4,), and the size of the last ``step``, infinite where
-    the method failed."""
+    ``rates`` with the value of the condition along the branch (4,), what rounding may do to them, the ``errors`` (k, 4),
+    and the size of the last ``step``, infinite where the method failed."""
 
     flow: Elements
     quantities: Array
     rates: Array
+    errors: Array
     step: float

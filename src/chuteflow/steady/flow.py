@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
+from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
-from chuteflow.steady.solver import Solution, in_parts
+from chuteflow.steady.solver import Solution
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
@@ -343,26 +343,17 @@ class Flow:
 
 
 def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
-    """The flows of many ``solutions`` on ``chute``; what their kinds are told from is computed side by side."""
-    flows = [Flow(chute, solution) for solution in solutions]
-    for degree in {solution.problem.degree for solution in solutions}:
-        for members in in_parts([flow for flow in flows if flow.solution.problem.degree == degree]):
-            stretches = np.array([[flow.solution.problem.stretch] for flow in members])
-            problem = Collocation(members[0].solution.problem.model, degree, stretches)
-            samples = _samples_of(problem.state(np.array([flow.solution.z for flow in members])))
-            for i, flow in enumerate(members):
-                vars(flow)["_samples"] = {name: values[i] for name, values in samples.items()}
-    return flows
+    """The flows of many ``solutions`` on ``chute``."""
+    return [Flow(chute, solution) for solution in solutions]
 
 
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem
-    degree = max(_SAMPLES, 2 * problem.degree)
+    fine, matrix = problem.transferred(max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
-    nu, rise, net = nodal @ refinement(problem.degree, degree).T
-    share, _ = stretch_map(grid(degree).nodes, problem.stretch)
-    return {"share": share, "nu": nu, "rise": rise, "net": net}
+    nu, rise, net = nodal @ matrix.T
+    return {"share": fine.share[0], "nu": nu, "rise": rise, "net": net}
 
 
 def _density(x: Array, f: Array) -> Array:

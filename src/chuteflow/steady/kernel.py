@@ -20,6 +20,8 @@ from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, GRIP, L
 
 #: Gauss points of an element.
 STAGES = 7
+#: Relative error of the terms of the equations by rounding and tabulation of the closures.
+_ROUNDING = 2e-14
 #: The longest step of Newton's method, and the largest change of ln x trusted.
 _LONGEST, _HALVINGS = 2.0, 8
 
@@ -89,7 +91,8 @@ def _assemble(
     ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta, y and
     mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
-    respect to theta at the Gauss points. Returns the largest residual, or infinity.
+    respect to theta at the Gauss points. Where ``local`` has six columns the last two are changes by what rounding does.
+    Returns the largest residual, or infinity.
     """
     slope, p_s = chute[0], chute[1]
     count = len(slopes)
@@ -108,9 +111,11 @@ def _assemble(
                 theta += h * integrals[j, i] * slopes[e, i, 0]
                 y += h * integrals[j, i] * slopes[e, i, 1]
             grown = math.exp(stretch * (breaks[e] + h * gauss[0, j]))
-            over = mass * (grown - 1.0) / whole if stretch * breaks[e] > 0.1 else mass * math.expm1(
-                stretch * (breaks[e] + h * gauss[0, j])
-            ) / whole
+            over = (
+                mass * (grown - 1.0) / whole
+                if stretch * breaks[e] > 0.1
+                else mass * math.expm1(stretch * (breaks[e] + h * gauss[0, j])) / whole
+            )
             w = mass * stretch * grown / whole
             p = over + p_s
             q = over / p
@@ -136,6 +141,11 @@ def _assemble(
             local[e, 2 * j + 1, 2] = f_y + w * y * q / p * (exchange - 0.5 * (1.0 - k) * v) + y_x * q
             local[e, 2 * j, 3] = f_theta - slopes[e, j, 0]
             local[e, 2 * j + 1, 3] = f_y - slopes[e, j, 1]
+            for c in range(local.shape[2] - 4):
+                # What rounding and the tabulated closures leave of the residuals, of one sign or of both.
+                sign = 1.0 if c == 0 or (31 * e + 17 * j) % 7 % 2 == 0 else -1.0
+                local[e, 2 * j, 4 + c] = _ROUNDING * sign * abs(f_theta)
+                local[e, 2 * j + 1, 4 + c] = _ROUNDING * sign * w * (abs(net) + abs(y * exchange / p))
             for c in range(2):
                 local[e, 2 * j, c] = jac[j, 0, c]
                 local[e, 2 * j + 1, c] = jac[j, 1, c]
@@ -205,8 +215,8 @@ def _step(
 ) -> bool:  # fmt: skip
     """Changes of ``ends``, ``slopes`` and mu for right sides ``values`` (r,) of the condition ``rows`` (4,).
 
-    The first right side is Newton's step; the others are changes along the branch: residuals of zero and a value of
-    the condition. ``ends_out`` (r, N+2, 2), whose last row holds the change of mu; ``slopes_out`` (r, N, STAGES, 2).
+    The first right side is Newton's step, the second the change along the branch for a value of the condition, the
+    others, if there are, what rounding does. ``ends_out`` (r, N+2, 2), whose last row holds the change of mu; ``slopes_out`` (r, N, STAGES, 2).
     """
     count = len(slopes)
     r = len(values)
@@ -237,6 +247,8 @@ def _step(
                 border[1] += factor * local[e, 2 * i, 1]
                 border[4] += factor * local[e, 2 * i, 2]
                 border[5] -= factor * local[e, 2 * i, 3]
+                for q in range(2, r):
+                    border[5 + q] -= factor * local[e, 2 * i, 2 + q]
         work[0] = carried
         for c in range(2):
             for q in range(5 + r):
@@ -251,6 +263,9 @@ def _step(
                 work[1 + c, 4] -= factor * local[e, 2 * j + c, 2]
                 jump -= factor * (slopes[e, j, c] + local[e, 2 * j + c, 3])
             work[1 + c, 5] = -jump
+            for q in range(2, r):
+                for j in range(STAGES):
+                    work[1 + c, 5 + q] += h * gauss[1, j] * local[e, 2 * j + c, 2 + q]
         for c in range(2):
             best = c
             for i in range(c + 1, 3):
@@ -301,7 +316,9 @@ def _step(
                 change = (
                     local[e, j, 0] * ends_out[c, e, 0] + local[e, j, 1] * ends_out[c, e, 1] + local[e, j, 2] * change_mu
                 )
-                slopes_out[c, e, j // 2, j % 2] = change + (local[e, j, 3] if c == 0 else 0.0)
+                if c != 1:
+                    change += local[e, j, 3 if c == 0 else 2 + c]
+                slopes_out[c, e, j // 2, j % 2] = change
     return True
 
 
@@ -328,22 +345,25 @@ def _change_of_quantities(
 @_jit
 def iterate(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
-    rows: Any, value: float, tolerance: float, most: int, quantities: Any, rates: Any,
+    rows: Any, value: float, tolerance: float, most: int, quantities: Any, rates: Any, errors: Any,
 ) -> tuple[float, float]:  # fmt: skip
     """Newton's method in place from ``ends``, ``slopes`` and ``mu`` for the flow with ``rows`` . quantities = value.
 
     Fills ``quantities`` (4,), ln Q, ln h, ln M and ln T_surface of the last iterate, and ``rates`` (4,), their
-    derivatives with respect to ``value`` along the branch, at the iterate before. Returns mu and the size of the last
+    derivatives with respect to ``value`` along the branch, at the iterate before; ``errors`` (k, 4), none or two rows, what
+    rounding of the equations may do to them. Returns mu and the size of the last
     step: infinite where it failed. A step is cut to a longest one, and halved while the largest residual does not
     fall.
     """
     count = len(slopes)
-    local = np.empty((count, 2 * STAGES, 4))
+    sides = len(errors)
+    local = np.empty((count, 2 * STAGES, 4 + sides))
     by_ends = np.zeros((2, count + 1, 3))
     by_slopes = np.empty((2, count, STAGES))
-    change_ends = np.empty((2, count + 2, 2))
-    change_slopes = np.empty((2, count, STAGES, 2))
-    values = np.array([value, 1.0])
+    change_ends = np.empty((2 + sides, count + 2, 2))
+    change_slopes = np.empty((2 + sides, count, STAGES, 2))
+    values = np.zeros(2 + sides)
+    values[0], values[1] = value, 1.0
     size = _assemble(
         table, chute, gauss, integrals, breaks, stretch, ends, slopes, mu, local, quantities, by_ends, by_slopes
     )
@@ -359,6 +379,9 @@ def iterate(
         ):  # fmt: skip
             return mu, math.inf
         _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[1], change_slopes[1], rates)
+        for c in range(sides):
+            change_e, change_s = change_ends[2 + c], change_slopes[2 + c]
+            _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_e, change_s, errors[c])
         longest = max(np.abs(change_ends[0, : count + 1]).max(), abs(change_ends[0, count + 1, 0]))
         if not math.isfinite(longest):
             return mu, math.inf

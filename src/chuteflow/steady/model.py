@@ -146,7 +146,6 @@ class Model:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
         return self.slope * self.slip(closures) - self.base_loss
 
-
     @cached_property
     def flux_scale(self) -> float:
         """The size of heat fluxes y: the largest of those that the base gives, and at which loss balances conduction."""

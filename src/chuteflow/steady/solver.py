@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
-from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.errors import InputError, SolveError
+from chuteflow.numerics.chebyshev import Array, tail
+from chuteflow.numerics.newton import newton
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
-from chuteflow.steady.elements import DEGREES, MOST_ELEMENTS, Elements
+from chuteflow.steady.elements import MOST_ELEMENTS, Elements
 from chuteflow.steady.model import Model
 
 #: Relative tolerance in Q, h and M unless another is asked for.
 TOLERANCE = 1e-10
-#: Least error ever claimed, and error of the residuals by rounding and tabulation of the closures.
-_FLOOR, _NOISE = 1e-12, 2e-14
+#: Least error ever claimed, and factor by which rounding may do more than in the cases that are tried.
+_FLOOR, _SAFETY = 1e-12, 4.0
 #: Newton's method ends with a step below this, after which the next one would be below rounding; steps at most.
 _STEP, _MOST_STEPS = 1e-7, 40
-#: Flows that are treated side by side at most.
-_TOGETHER = 256
-
-Item = TypeVar("Item")
+#: A grid resolves a flow where the coefficients of g and y decay to this, and the integrals agree to the second.
+_RESOLVED, _AGREES = 1e-11, 1e-10
 
 
 class Status(Enum):
@@ -82,7 +80,7 @@ class Solution:
 
     @cached_property
     def _on_grid(self) -> tuple[Collocation, Array]:
-        return self.source if isinstance(self.source, tuple) else self.source.collocated()
+        return self.source if isinstance(self.source, tuple) else collocate(self)
 
     @property
     def problem(self) -> Collocation:
@@ -121,6 +119,44 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
     return other, np.concatenate([z[..., :-2] @ matrix.T, z[..., -2:]], axis=-1)
 
 
+def collocate(solution: Solution) -> tuple[Collocation, Array]:
+    """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.
+
+    Newton's method on the grid, in the plane through the flow across its branch: profiles are then as accurate as the
+    integrals over the depth.
+
+    Raises:
+        SolveError: where no grid resolves it.
+    """
+    rates = solution.rates
+    weights = np.array([0.0, 0.0, 0.0, 1.0]) if rates is None else rates / np.linalg.norm(rates)
+    value = np.array(float(weights @ solution.macroscopic))
+    for problem, start in solution.elements.grids():
+        found = newton(
+            lambda z, problem=problem: _system(problem.state(z), weights, value),
+            start,
+            tolerance=_STEP,
+            longest_step=2.0,
+        )
+        if found.converged:
+            state = problem.state(found.z)
+            decay = tail(problem.grid, np.stack([state.g / np.abs(state.g).max(), state.y / np.abs(state.y).max()]))
+            off = float(np.abs(state.macroscopic() - solution.macroscopic)[:LOG_T].max())
+            if decay < _RESOLVED and off < max(_AGREES, 10.0 * solution.error):
+                return problem, found.z
+    raise SolveError("no grid resolves the profiles of a flow: ask for a larger tolerance")
+
+
+def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
+    """Residual and Jacobian of the steady problem with its condition, the last equation."""
+    gradient = (weights[..., None] * state.macroscopic_gradient()).sum(axis=-2)
+    off = (weights * state.macroscopic()).sum(axis=-1) - value
+    return (
+        np.concatenate([state.residual(), off[..., None]], axis=-1),
+        np.concatenate([state.jacobian(), gradient[..., None, :]], axis=-2),
+    )
+
+
 def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
     """The flow nearest to ``start`` that meets ``condition``.
 
@@ -132,11 +168,11 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     weights, value = np.array(condition.weights), condition.value
     coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)
     while np.isfinite(coarse.step):
-        fine = coarse.flow.halved().iterated(weights, value, np.inf, 1)
+        fine = coarse.flow.halved().iterated(weights, value, np.inf, 1, rounding=True)
         if not np.isfinite(fine.step):
             break
         change = float(np.abs(fine.quantities - coarse.quantities)[:LOG_T].max())
-        noise = max(_FLOOR, _NOISE * float(np.abs(fine.rates).max()))
+        noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors[:, :LOG_T]).max()))
         if change < max(tolerance, noise):
             return Solution(fine.quantities, max(change, noise), Status.CONVERGED, fine.flow, fine.rates)
         if len(fine.flow.slopes) > MOST_ELEMENTS:
@@ -150,12 +186,6 @@ def solve_many(
 ) -> list[Solution]:
     """As :func:`solve`, for many flows."""
     return [solve(start, condition, tolerance) for start, condition in zip(starts, conditions, strict=True)]
-
-
-def in_parts(members: list[Item]) -> Iterator[list[Item]]:
-    """As many members at a time as are treated side by side: more would take memory and no less time."""
-    for first in range(0, len(members), _TOGETHER):
-        yield members[first : first + _TOGETHER]
 
 
 def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:

@@ -35,7 +35,6 @@ from chuteflow.trajectories.tables import (
     POTENTIAL,
     RELAX_ABOVE,
     RELAX_HIGH,
-    SLIP,
     SPREAD,
     WORKED,
 )
@@ -121,9 +120,7 @@ def _advance(values: Any, slope: float, p_s: float, p_1: float, over: float, aft
 
 
 @_jit
-def _surface(
-    values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, state: Any
-) -> None:
+def _surface(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, state: Any) -> None:
     """A state close to the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
         half = 0.5 * values[0, NET]
@@ -201,11 +198,7 @@ def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, o
         if j + 2 < n and open_[j + 1]:
             right = _limited_slope(rise, rows[j + 2, q] - rows[j + 1, q], d, length[j + 1])
         # One-sided slopes at the ends of a piece are those of the chord.
-        out[q] = (
-            rows[j, q]
-            + t * rise
-            + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
-        )
+        out[q] = rows[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
 
 
 @_jit

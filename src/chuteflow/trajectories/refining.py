@@ -174,9 +174,7 @@ def carry_down(
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
         refinement.delta, 1.0 / t.scale, refinement.finest, refinement.most,
     )  # fmt: skip
-    return TrajectoryGrid(
-        model, overburden, states, came_from, first, zeros, links, unresolved, status == kernel.DONE
-    )
+    return TrajectoryGrid(model, overburden, states, came_from, first, zeros, links, unresolved, status == kernel.DONE)
 
 
 def _start_at_most(t: Tables) -> float:

@@ -48,9 +48,7 @@ def tables(model: Model) -> Tables:
     conduction, coupling = f[CONDUCTION], f[COUPLING]
     net = f[LOSS] - model.slope**2 * f[WORK]
     base = model.base_flux(f)
-    values = np.stack(
-        [1.0 / conduction, coupling, net, base, f[WORK], f[DENSITY], f[GAMMA], model.slip(f)], axis=1
-    )
+    values = np.stack([1.0 / conduction, coupling, net, base, f[WORK], f[DENSITY], f[GAMMA], model.slip(f)], axis=1)
     curve = 0.5 * (1.0 - coupling) / conduction
     relax = 1.0 + 0.5 * coupling
     lowest, highest = np.minimum.accumulate, np.maximum.accumulate
