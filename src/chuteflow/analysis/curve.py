@@ -19,12 +19,19 @@ from chuteflow.analysis.rough_turns import dips
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.flow import Flow, flows_of
+from chuteflow.steady.flow import Flow, flows_of, rough_kinds
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 
-#: Quantities whose folds are located.
+#: Quantities whose folds are located, and others at whose zeros a flow changes its kind.
 _FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
+_CHANGES: tuple[tuple[str, Callable[[Flow], float]], ...] = (
+    ("density-inversion", lambda flow: flow.density_excess),
+    ("interior-change", lambda flow: flow.net_loss_range[0]),
+    ("interior-change", lambda flow: flow.net_loss_range[1]),
+)
+#: Rough values nearer to zero are not trusted.
+_UNSURE = 1e-5
 
 
 def curve(
@@ -104,20 +111,19 @@ def _folds(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tup
 def _changes(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which the density turns inverted, or the interior another kind, with their arclengths."""
     points, at = family.points, family.arclength
-    flows = flows_of(chute, family.solutions)
-    for kind, quantity in (
-        ("density-inversion", lambda flow: flow.density_excess),
-        ("interior-change", lambda flow: flow.net_loss_range[0]),
-        ("interior-change", lambda flow: flow.net_loss_range[1]),
-    ):
-        values = np.array([quantity(flow) for flow in flows])
+    rough = np.array([rough_kinds(point.solution) for point in points])
+    for column, (kind, quantity) in enumerate(_CHANGES):
+        # What is near to zero is told by the flow itself.
+        values = rough[:, column].copy()
+        for i in np.flatnonzero(np.abs(values) < _UNSURE).tolist():
+            values[i] = quantity(Flow(chute, points[i].solution))
         # The slopes are rough: what comes as near to zero as half of its way there is looked at.
         ways = {
             d.step: d
             for d in dips(values, at)
             if abs(d.value) < 0.5 * max(np.abs(values[d.step : d.step + 2])) or d.zeros
         }
-        for i in range(len(flows) - 1):
+        for i in range(len(points) - 1):
             chord = Chord(points[i], points[i + 1], tolerance)
             if (values[i] > 0.0) != (values[i + 1] > 0.0):
                 found = [find_zero(chord, _of_flow(chute, quantity), (values[i], values[i + 1]))]
