@@ -1,7 +1,8 @@
 """Every branch of flows of a chute in order, with its special points located.
 
-Branches come from the grid of trajectories (:mod:`chuteflow.trajectories.refining`), and are solved by as many points as
-it takes to know them (:mod:`chuteflow.analysis.paths`): folds are found from these, whatever number of flows is asked for.
+Branches come from the grid of trajectories (:mod:`chuteflow.trajectories.refining`), and are solved by as many points
+as it takes to know them (:mod:`chuteflow.analysis.paths`): folds are found from these, whatever number of flows is
+asked for.
 """
 
 from __future__ import annotations

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.analysis.existence import reason_for_none
-from chuteflow.analysis.families import Family, crossings, families
+from chuteflow.analysis.families import Family, crossings, families, search
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.analysis.results import FlowSet, Searched
 from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import flows_of
@@ -58,7 +59,6 @@ def flows(
 
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
-        SolveError: where a flow that was seen could not be solved to the tolerance.
     """
     which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
@@ -67,39 +67,49 @@ def flows(
         # Well inside, so that a turn near the value is seen from both sides.
         within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
     problem = model(chute)
-    search = _search(problem, which, value, tolerance, within)
+    found = _search(problem, which, value, tolerance, within)
     for _ in range(_EXTENSIONS):
-        wider = _wider(search, which, value)
-        if wider == search.within:
+        wider = _wider(found, which, value)
+        if wider == found.within or found.carried < found.within.deepest * (1.0 - 1e-9):
             break
-        search = _search(problem, which, value, tolerance, wider)
+        found = _search(problem, which, value, tolerance, wider)
     return FlowSet(
         chute=chute,
-        flows=tuple(flows_of(chute, search.solutions)),
-        searched=Searched((search.within.coldest, search.within.hottest), search.within.deepest),
+        flows=tuple(flows_of(chute, found.solutions)),
+        searched=Searched((found.within.coldest, found.within.hottest), found.within.deepest),
         tolerance=tolerance,
         reason=None
-        if search.solutions
-        else reason_for_none(problem, [f.macroscopic for f in search.families], which, value, search.within),
-        incomplete=_left_out(search, which, value),
+        if found.solutions
+        else reason_for_none(problem, [f.macroscopic for f in found.families], which, value, found.within),
+        incomplete=_left_out(found, which, value),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The families in a range, the flows among them that meet a condition, and those found just ``beyond`` it."""
+    """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
+    rough quantities of flows that were seen and not solved, and the hold-up down to which the search was
+    ``carried``."""
 
     within: Range
     families: tuple[Family, ...]
     solutions: list[Solution]
     beyond: list[Solution]
+    lost: list[Array]
+    carried: float
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
     found = families(problem, within)
-    solutions = [s for family in found for s in crossings(family, which, value, tolerance)]
+    solutions: list[Solution] = []
+    lost: list[Array] = []
+    for family in found:
+        solved, missed = crossings(family, which, value, tolerance)
+        solutions += solved
+        lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)])
-    return _Search(within, found, inside, [s for s in solutions if not within.contains(s.macroscopic)])
+    beyond = [s for s in solutions if not within.contains(s.macroscopic)]
+    return _Search(within, found, inside, beyond, lost, search(problem, within).deepest)
 
 
 def _asked(given: dict[str, float | None]) -> tuple[int, float]:
@@ -142,15 +152,22 @@ def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
                     yield _Lead(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
 
 
-def _left_out(search: _Search, which: int, value: float) -> str | None:
-    """Which family was not followed to where it may have the value, in words."""
-    for lead in _leads(search, which, value):
+def _left_out(found: _Search, which: int, value: float) -> str | None:
+    """What the search leaves open, in words: flows not solved, depths not reached, branches not followed to where they
+    may have the value."""
+    if found.lost:
+        mass, temperature = np.exp(found.lost[0][LOG_M:])
+        many = f"{len(found.lost)} flows were" if len(found.lost) > 1 else "a flow was"
+        return f"{many} seen and not solved, near M = {mass:.4g} and T_surface = {temperature:.4g}"
+    if found.carried < found.within.deepest * (1.0 - 1e-9):
+        return f"beyond a hold-up of {found.carried:.4g} there are too many flows to search"
+    for lead in _leads(found, which, value):
         if lead.axis == LOG_M:
-            there = f"hold-ups above {search.within.deepest:g}"
+            there = f"hold-ups above {found.within.deepest:g}"
         elif lead.edge > 0:
-            there = f"surface temperatures above {search.within.hottest:g}"
+            there = f"surface temperatures above {found.within.hottest:g}"
         else:
-            there = f"surface temperatures below {search.within.coldest:g}"
+            there = f"surface temperatures below {found.within.coldest:g}"
         return f"a branch goes on to {there}, outside the range searched"
     return None
 

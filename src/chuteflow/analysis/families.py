@@ -19,11 +19,11 @@ from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
-#: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has turned
-#: by an angle of the cosine.
+#: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
+#: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
-#: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction there is
-#: not known.
+#: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
+#: there is not known.
 _SHARP = 0.8
 #: A solved flow lies within this of the rough one, and this fraction of the spacing.
 _ROUGH, _ASTRAY = 0.03, 0.3
@@ -162,12 +162,11 @@ def search(model: Model, within: Range) -> TrajectoryGrid:
     return carry_down(model, within.coldest, within.hottest, within.deepest)
 
 
-def crossings(family: Family, which: int, value: float, tolerance: float = TOLERANCE) -> list[Solution]:
-    """The flows of a branch at which the quantity ``which`` equals ``value``.
-
-    Raises:
-        SolveError: where a flow that is there could not be solved.
-    """
+def crossings(
+    family: Family, which: int, value: float, tolerance: float = TOLERANCE
+) -> tuple[list[Solution], list[Array]]:
+    """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
+    that were seen and could not be solved."""
     target = float(np.log(value))
     m = family.macroscopic
     off = m[:, which] - target
@@ -176,10 +175,17 @@ def crossings(family: Family, which: int, value: float, tolerance: float = TOLER
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
     found: list[Solution] = []
+    lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
         single = _single(family, which, target, off, begin, end, tolerance)
-        found += [single] if single is not None else _among(family, which, target, begin, end, tolerance)
-    return found
+        if single is not None:
+            found.append(single)
+            continue
+        try:
+            found += _among(family, which, target, begin, end, tolerance)
+        except SolveError:
+            lost += [m[i] for i in changes.tolist() if begin <= i < end]
+    return found, lost
 
 
 def _is_behind(point: Point, last: Point) -> bool:
@@ -228,13 +234,14 @@ def _single(
 
 
 def _among(family: Family, which: int, target: float, begin: int, end: int, tolerance: float) -> list[Solution]:
-    """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic pieces."""
+    """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
+    pieces."""
     points = family.points(begin, end, tolerance)
     placed = [(float(i), point) for i, point in enumerate(points)]
     placed += [(turn.place, turn.point) for turn in turns(points, which, tolerance)]
     placed.sort(key=lambda pair: pair[0])
     found = []
-    for (_, one), (_, other) in zip(placed[:-1], placed[1:], strict=True):
+    for (_, one), (_, other) in pairwise(placed):
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
             _, point = find_value(Chord(one, other, tolerance), which, target)

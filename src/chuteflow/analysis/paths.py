@@ -20,12 +20,13 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.elements import Elements
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, between, solve
 
-#: Neighbouring points suffice where their tangents differ by less than this angle, and their mean from the chord by less
-#: than the second: two neighbouring branches that are taken for one show there.
+#: Neighbouring points suffice where their tangents differ by less than this angle, and their mean from the chord by
+#: less than the second: two neighbouring branches that are taken for one show there.
 _ANGLE, _ASIDE = 0.35, 0.03
 #: The branch comes back beside itself between two points whose tangents differ by more.
 _OPPOSED = 1.6
-#: Points are not brought closer than this, nor more put between two; where they do not suffice then, the branch is lost.
+#: Points are not brought closer than this, nor more put between two; where they do not suffice then, the branch is
+#: lost.
 _CLOSEST, _MOST_BETWEEN = 1e-9, 200
 #: A slope along the branch is known between two points to this fraction of what it changes, before points between them
 #: have shown better, which is trusted down to the second; below the third a change of sign is a single one.
@@ -73,8 +74,8 @@ def _point_between(first: Solution, last: Solution, sigma: float, tolerance: flo
 
 
 def solve_between(first: Solution, last: Solution, fraction: float, tolerance: float = TOLERANCE) -> Solution:
-    """The flow at a ``fraction`` of the chord between two neighbours of a branch, or a little beyond, in the plane normal
-    to it.
+    """The flow at a ``fraction`` of the chord between two neighbours of a branch, or a little beyond, in the plane
+    normal to it.
 
     Raises:
         SolveError: where it is not found.

@@ -95,8 +95,8 @@ class Elements:
         )
 
     def grids(self) -> Iterator[tuple[Collocation, Array]]:
-        """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to about
-        1e-8: between the ends of the elements the polynomials have no more digits.
+        """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to
+        about 1e-8: between the ends of the elements the polynomials have no more digits.
 
         Last comes one with a grid on each of some pieces.
         """
@@ -198,8 +198,8 @@ class Elements:
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """What Newton's method came to: the flow, its ``quantities`` ln Q, ln h, ln M and ln T_surface (4,), their
-    ``rates`` with the value of the condition along the branch (4,), what rounding may do to them, the ``errors`` (k, 4),
-    and the size of the last ``step``, infinite where the method failed."""
+    ``rates`` with the value of the condition along the branch (4,), what rounding may do to them, the ``errors`` (k,
+    4), and the size of the last ``step``, infinite where the method failed."""
 
     flow: Elements
     quantities: Array

@@ -91,8 +91,8 @@ def _assemble(
     ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta, y and
     mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
-    respect to theta at the Gauss points. Where ``local`` has six columns the last two are changes by what rounding does.
-    Returns the largest residual, or infinity.
+    respect to theta at the Gauss points. Where ``local`` has six columns the last two are changes by what rounding
+    does. Returns the largest residual, or infinity.
     """
     slope, p_s = chute[0], chute[1]
     count = len(slopes)
@@ -216,7 +216,8 @@ def _step(
     """Changes of ``ends``, ``slopes`` and mu for right sides ``values`` (r,) of the condition ``rows`` (4,).
 
     The first right side is Newton's step, the second the change along the branch for a value of the condition, the
-    others, if there are, what rounding does. ``ends_out`` (r, N+2, 2), whose last row holds the change of mu; ``slopes_out`` (r, N, STAGES, 2).
+    others, if there are, what rounding does. ``ends_out`` (r, N+2, 2), whose last row holds the change of mu;
+    ``slopes_out`` (r, N, STAGES, 2).
     """
     count = len(slopes)
     r = len(values)
@@ -350,10 +351,9 @@ def iterate(
     """Newton's method in place from ``ends``, ``slopes`` and ``mu`` for the flow with ``rows`` . quantities = value.
 
     Fills ``quantities`` (4,), ln Q, ln h, ln M and ln T_surface of the last iterate, and ``rates`` (4,), their
-    derivatives with respect to ``value`` along the branch, at the iterate before; ``errors`` (k, 4), none or two rows, what
-    rounding of the equations may do to them. Returns mu and the size of the last
-    step: infinite where it failed. A step is cut to a longest one, and halved while the largest residual does not
-    fall.
+    derivatives with respect to ``value`` along the branch, at the iterate before; ``errors`` (k, 4), none or two rows,
+    what rounding of the equations may do to them. Returns mu and the size of the last step: infinite where it failed.
+    A step is cut to a longest one, and halved while the largest residual does not fall.
     """
     count = len(slopes)
     sides = len(errors)
@@ -455,7 +455,7 @@ def distribute(s: Any, theta: Any, y: Any, per_flux: float, longest: float) -> A
     for i in range(1, n):
         change = abs(theta[i] - theta[i - 1]) + abs(y[i] - y[i - 1]) * per_flux
         total[i] = total[i - 1] + change + (s[i] - s[i - 1]) / longest
-    count = max(int(math.ceil(total[n - 1])), 2)
+    count = max(math.ceil(total[n - 1]), 2)
     breaks = np.empty(count + 1)
     breaks[0], breaks[count] = 0.0, 1.0
     at = 0

@@ -148,7 +148,8 @@ class Model:
 
     @cached_property
     def flux_scale(self) -> float:
-        """The size of heat fluxes y: the largest of those that the base gives, and at which loss balances conduction."""
+        """The size of heat fluxes y: the largest of those that the base gives, and at which loss balances
+        conduction."""
         f, _ = self.closures(np.append(0.0, np.geomspace(1e-3, 1e6, 64)))
         net = f[LOSS] - self.slope**2 * f[WORK]
         balance = np.sqrt(2.0 * np.maximum(net, 0.0) * f[CONDUCTION])

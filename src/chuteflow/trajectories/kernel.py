@@ -88,7 +88,8 @@ def _integrands(values: Any, slope: float, p_s: float, over: float, big_l: float
 
 @_jit
 def _advance(values: Any, slope: float, p_s: float, p_1: float, over: float, after: float, state: Any) -> None:
-    """One step of the classical Runge-Kutta method in tau from overburden ``over`` to ``after``; integrals by Simpson."""
+    """One step of the classical Runge-Kutta method in tau from overburden ``over`` to ``after``; integrals by
+    Simpson."""
     half_tau = 0.5 * (math.log(after / over) + (after - over) / p_1)
     middle = over
     # The overburden in the middle of the step, by Newton's method in ln P.
@@ -253,9 +254,9 @@ def carry(
     """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending.
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
-    where it was inserted, the first position of each row (R + 1,), zeros of B: left or upper position, right or lower position, fraction between
-    (Z, 3), their neighbours along the zero set (Z, 2), positions of edges that were not resolved (U,), and how the
-    curve ended.
+    where it was inserted, the first position of each row (R + 1,), zeros of B: left or upper position, right or lower
+    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), positions of edges that were not
+    resolved (U,), and how the curve ended.
     """
     n = len(log_t)
     room = 64 * n + 1024
@@ -337,7 +338,7 @@ def carry(
                 elif secant * left < 0.0 or secant * right < 0.0:
                     wanted[j] = 1
             extra += wanted[j]
-        if n + extra > most:
+        if total + n + extra > most:
             status = FULL
             first[row + 1 :] = total
             break

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class Refinement:
         per_decade: trajectories per decade of surface temperature at the surface.
         step: step in tau = ln P + P/p_1; larger ones are less accurate.
         lengths: largest step in P over the shortest length of the equations.
-        most: trajectories at one depth at most; beyond, the search ends there and says so.
+        most: states kept at most, 48 bytes each; beyond, the search ends at the depth that it has reached, and says so.
     """
 
     delta: float = 0.4
@@ -50,12 +51,13 @@ class Refinement:
     per_decade: float = 6.0
     step: float = 0.25
     lengths: float = 0.6
-    most: int = 20_000
+    most: int = 1_200_000
 
 
 #: The refinement of every search unless another is asked for.
 REFINEMENT = Refinement()
-#: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least overburden.
+#: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
+#: overburden.
 _THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
 
 
@@ -83,9 +85,9 @@ class TrajectoryGrid:
 
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
     curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
-    row before, between two states where it was inserted. ``zeros`` (Z, 3) are the two states between which B vanishes, and the fraction
-    of the way. ``unresolved`` (U,) are states that are too far from their neighbour beside a zero. ``complete`` tells
-    whether the curve was carried to the last depth.
+    row before, between two states where it was inserted. ``zeros`` (Z, 3) are the two states between which B vanishes,
+    and the fraction of the way. ``unresolved`` (U,) are states that are too far from their neighbour beside a zero.
+    ``complete`` tells whether the curve was carried to the last depth.
     """
 
     model: Model
@@ -101,8 +103,9 @@ class TrajectoryGrid:
     @property
     def deepest(self) -> float:
         """The overburden down to which the curve was carried."""
-        carried = int(np.searchsorted(self.first, len(self.states), side="left"))
-        return float(self.overburden[min(carried, len(self.overburden)) - 1])
+        if self.complete:
+            return float(self.overburden[-1])
+        return float(self.overburden[max(int(np.searchsorted(self.first, len(self.states), side="left")) - 1, 0)])
 
     def _rows(self, places: Index) -> Index:
         return np.searchsorted(self.first, places, side="right") - 1
@@ -125,7 +128,7 @@ class TrajectoryGrid:
         """The branches of flows, the longest first."""
         order, starts = kernel.walk(self.links)
         found = []
-        for begin, end in zip(starts[:-1], starts[1:], strict=True):
+        for begin, end in pairwise(starts.tolist()):
             zeros = order[begin:end]
             closed = bool(len(zeros) > 2 and self.links[zeros[0], 1] >= 0)
             found.append(RoughBranch(self, zeros, self.macroscopic[zeros], closed))

@@ -14,9 +14,9 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
+from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import IMAGINARY_STEP
-from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.solver import Solution, Status, prolong
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.

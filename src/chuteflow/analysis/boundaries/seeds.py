@@ -225,7 +225,7 @@ def _beside(
             break
         at += float(np.clip(ahead - at, -_STRIDE * reach, _STRIDE * reach))
         moved = replace(solution.problem, model=sweep.models(at)[0])
-        solution = resolve(replace(solution, problem=moved), plane, _ROUGH)
+        solution = resolve(replace(solution, source=(moved, solution.z)), plane, _ROUGH)
         if not solution.converged:
             return None
     else:

@@ -17,8 +17,8 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
 from chuteflow.steady.collocation import LOG_M
-from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.elements import DEGREES
+from chuteflow.steady.model import IMAGINARY_STEP
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
 CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
