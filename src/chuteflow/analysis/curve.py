@@ -17,9 +17,8 @@ from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
 from chuteflow.analysis.tracing import Stretch, TracedFamily
-from chuteflow.analysis.turns import may_turn, turns
+from chuteflow.analysis.turns import dips, turns
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
@@ -114,36 +113,20 @@ def _changes(
         ("interior-change", lambda flow: flow.net_loss_range[1]),
     ):
         values = np.array([quantity(flow) for flow in flows])
-        dips = _dips(values, at)
+        # The slopes are rough: what comes as near to zero as half of its way there is looked at.
+        ways = {
+            d.step: d
+            for d in dips(values, at)
+            if abs(d.value) < 0.5 * max(np.abs(values[d.step : d.step + 2])) or d.zeros
+        }
         for i in range(len(flows) - 1):
             if (values[i] > 0.0) != (values[i + 1] > 0.0):
                 found = [_zero(flows[i], flows[i + 1], quantity, (values[i], values[i + 1]), tolerance)]
-            elif i in dips:
-                found = _pair(flows[i], flows[i + 1], quantity, dips[i], tolerance)
+            elif i in ways:
+                found = _pair(flows[i], flows[i + 1], quantity, ways[i].share, tolerance)
             else:
                 continue
             yield from ((kind, flow, at[i] + share * (at[i + 1] - at[i])) for share, flow in found)
-
-
-def _dips(values: Array, at: Array) -> dict[int, float]:
-    """Steps of a path between values of one sign, in which a quantity turns and may pass zero: the step, and the share
-    of it at which it comes nearest to that, as the cubic with slopes by differences says."""
-    if len(values) < 3:
-        return {}
-    slope = np.gradient(values, at)
-    out = {}
-    for i in np.flatnonzero(may_turn(np.diff(values) / np.diff(at))).tolist():
-        length = at[i + 1] - at[i]
-        (f0, f1), (d0, d1) = values[i : i + 2], slope[i : i + 2] * length
-        cubic = np.array([2.0 * (f0 - f1) + d0 + d1, 3.0 * (f1 - f0) - 2.0 * d0 - d1, d0, f0])
-        turning = np.roots(np.polyder(cubic))
-        inside = turning.real[(turning.imag == 0.0) & (turning.real > 0.0) & (turning.real < 1.0)]
-        if len(inside):
-            lowest = float(min(inside, key=lambda x: np.sign(f0) * np.polyval(cubic, x)))
-            # The slopes are rough: what comes as near to zero as half of the way that it goes is looked at.
-            if np.sign(f0) * np.polyval(cubic, lowest) < 0.5 * (max(abs(f0), abs(f1)) - abs(np.polyval(cubic, lowest))):
-                out[i] = lowest
-    return out
 
 
 def _pair(
