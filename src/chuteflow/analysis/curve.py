@@ -17,8 +17,9 @@ from chuteflow.analysis.families import traced_families
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
 from chuteflow.analysis.tracing import Stretch, TracedFamily
-from chuteflow.analysis.turns import dips, turns
+from chuteflow.analysis.turns import Dip, dips, turns
 from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
@@ -113,20 +114,20 @@ def _changes(
         ("interior-change", lambda flow: flow.net_loss_range[1]),
     ):
         values = np.array([quantity(flow) for flow in flows])
-        # The slopes are rough: what comes as near to zero as half of its way there is looked at.
-        ways = {
-            d.step: d
-            for d in dips(values, at)
-            if abs(d.value) < 0.5 * max(np.abs(values[d.step : d.step + 2])) or d.zeros
-        }
+        ways = {dip.step: dip.share for dip in dips(values, at) if _reaches(dip, values)}
         for i in range(len(flows) - 1):
             if (values[i] > 0.0) != (values[i + 1] > 0.0):
                 found = [_zero(flows[i], flows[i + 1], quantity, (values[i], values[i + 1]), tolerance)]
             elif i in ways:
-                found = _pair(flows[i], flows[i + 1], quantity, ways[i].share, tolerance)
+                found = _pair(flows[i], flows[i + 1], quantity, ways[i], tolerance)
             else:
                 continue
             yield from ((kind, flow, at[i] + share * (at[i + 1] - at[i])) for share, flow in found)
+
+
+def _reaches(dip: Dip, values: Array) -> bool:
+    """Whether a dip may reach zero: the slopes are rough, so that one that comes half of the way there may."""
+    return bool(dip.zeros) or abs(dip.value) < 0.5 * float(np.abs(values[dip.step : dip.step + 2]).max())
 
 
 def _pair(

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.chords import Chord
-from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation
@@ -41,8 +40,8 @@ _ALONG = 0.6
 #: The bump counts so many times, and may be this part of the largest m', or of the chord; flows have errors, and it
 #: is not known better than so many times them.
 _SAFETY, _SMALL, _NOISE = 4.0, 0.1, 8.0
-#: How often a stretch is halved. A chord of 0.5 is then as short as 5e-4.
-_HALVINGS = 10
+#: A chord shorter than this is not halved any more: its model is taken as it is.
+_SHORTEST = 1e-4
 #: An m' below this tells nothing of a turn; and turns are none whose values differ by less, or by their errors.
 _FLAT, _LEAST = 1e-8, 1e-11
 #: A place is known after a step of Newton's below this, in sigma, and before one below the second; a bracket ends when
@@ -161,7 +160,7 @@ def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOL
     found = [
         Turn(quantity, i + place, solution)
         for i in np.flatnonzero(models.open(which)).tolist()
-        for quantity, place, solution in _between(at[i], at[i + 1], which, tolerance, _HALVINGS)
+        for quantity, place, solution in _between(at[i], at[i + 1], which, tolerance)
     ]
     found.sort(key=lambda turn: turn.place)
     told = [turn for quantity in which for turn in _told([t for t in found if t.which == quantity], path)]
@@ -221,6 +220,8 @@ class Models:
             forward = [np.isfinite(part[0]).all(axis=1) & (part[2] > 0.0) for part in (begin, end)]
             whole = 0.5 * (begin[0] + end[0]) + (begin[1] - end[1]) / 12.0
             bump = 5.0 * (gain - whole)  # in the middle coefficient; 3/8 of it in m'
+            errors = np.array([a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)])
+            bump[np.abs(bump) <= 5.0 * _NOISE * errors[:, None]] = 0.0
             slope = np.stack(
                 [
                     begin[0],
@@ -231,11 +232,11 @@ class Models:
                 ],
                 axis=-1,
             )
-            errors = [a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)]
-            unknown = np.maximum(np.abs(bump) - 5.0 * _NOISE * np.array(errors)[:, None], 0.0)
             size = np.maximum(np.abs(slope).max(axis=-1), length[:, None])
-            sure = (unknown < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG) & forward[0] & forward[1]
-        return cls(slope, unknown, length, sure)
+            sure = (
+                (np.abs(bump) < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG) & forward[0] & forward[1]
+            )
+        return cls(slope, np.abs(bump), length, sure)
 
     def open(self, which: Sequence[int]) -> NDArray[np.bool_]:
         """Whether one of the quantities may turn (k,)."""
@@ -257,7 +258,7 @@ def _over_sigma(at: Sequence[Expansion], row: Array) -> tuple[Array, Array, Arra
 
 
 def _between(
-    first: Expansion, last: Expansion, which: Sequence[int], tolerance: float, halvings: int
+    first: Expansion, last: Expansion, which: Sequence[int], tolerance: float
 ) -> Iterator[tuple[int, float, Solution]]:
     """The turns in a stretch: the quantity, the place from 0 to 1, and the flow."""
     models = Models.between([first], [last])
@@ -265,22 +266,21 @@ def _between(
         return
     chord = Chord(first.solution, last.solution, tolerance, in_space=True)
     brackets = {quantity: _brackets(models, quantity) for quantity in which if models.open((quantity,))[0]}
-    if models.sure[0] and all(found is not None for found in brackets.values()):
+    short = float(models.length[0]) < _SHORTEST
+    if short or (models.sure[0] and all(found is not None for found in brackets.values())):
         located = [
             (quantity, _located(chord, quantity, bracket))
             for quantity, found in brackets.items()
             for bracket in found or ()
         ]
-        if all(turn is not None for _, turn in located):
+        if short or all(turn is not None for _, turn in located):
             yield from ((quantity, *turn) for quantity, turn in located if turn is not None)
             return
-    if not halvings:
-        raise SolveError("a branch turns too sharply to tell its turning points: narrow the range searched")
     middle = chord.at(0.5)
     (between,) = expansions([middle], _unit(chord))
-    for quantity, place, turn in _between(first, between, which, tolerance, halvings - 1):
+    for quantity, place, turn in _between(first, between, which, tolerance):
         yield quantity, 0.5 * place, turn
-    for quantity, place, turn in _between(between, last, which, tolerance, halvings - 1):
+    for quantity, place, turn in _between(between, last, which, tolerance):
         yield quantity, 0.5 + 0.5 * place, turn
 
 
