@@ -16,13 +16,16 @@ from chuteflow.steady.solver import TOLERANCE, Condition, Solution, Status, alik
 _CLOSE = 1e-9
 #: Where the solver does not converge it starts from nearer flows, found so many times half-way.
 _NEARER = 3
+#: Tolerance of flows that the finest grid does not resolve further.
+_LOOSE = 1e-5
 
 
 class Chord:
     """The stretch of a family between two solved flows, as a function of sigma.
 
     The chord lies in the plane (ln M, ln T_surface); in the space of all four quantities if ``in_space``, for families
-    that hardly move in the plane where deep flows change near the base alone.
+    that hardly move in the plane where deep flows change near the base alone. There a flow that the finest grid does
+    not resolve to the tolerance is taken with the error that it has.
     """
 
     def __init__(
@@ -36,7 +39,7 @@ class Chord:
         self._begin = float(self.row @ first.macroscopic)
         self._known = [(0.0, first), (1.0, last)]
         self._alike: dict[tuple[float, float], tuple[Collocation, Array, Array]] = {}
-        self._tolerance = tolerance
+        self._tolerance, self._in_space = tolerance, in_space
 
     def at(self, sigma: float) -> Solution:
         """The flow at ``sigma``.
@@ -52,6 +55,8 @@ class Chord:
             nearest = min((known for known, _ in self._known), key=lambda known: abs(known - sigma))
             self._at(0.5 * (nearest + sigma), nearer - 1)
             return self._at(sigma, nearer - 1)
+        if solution.status is Status.UNRESOLVED and self._in_space:
+            solution = solve(*self.start_at(sigma), self.condition_at(sigma), max(self._tolerance, _LOOSE))
         if not solution.converged:
             raise SolveError(f"a family of flows could not be followed: {solution.status.value}")
         self._known.append((sigma, solution))

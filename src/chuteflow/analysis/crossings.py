@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.chords import Chord
-from chuteflow.analysis.turns import Bracket, along, directions, find_zero, may_turn, turns
+from chuteflow.analysis.turns import Bracket, along, directions, find_zero, followed, may_turn
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation
@@ -142,10 +142,10 @@ def _with_turns(path: _Path, which: int, target: float) -> _Path:
         # Steps first to last-1 lie between the knots first to last.
         out += knots[begin : kept[first]]
         stretch = solved_path([knots[i] for i in kept[first : last + 1]])
-        turning = [(turn.place, Knot.at(turn.solution)) for turn in turns(stretch, (which,))]
-        found += [knot for _, knot in turning]
-        places = [*((float(i), Knot.at(solution)) for i, solution in enumerate(stretch)), *turning]
-        out += [knot for _, knot in sorted(places, key=lambda place: place[0])]
+        stops = followed(stretch, (which,))
+        exact = [Knot.at(stop.solution) for stop in stops]
+        found += [knot for stop, knot in zip(stops, exact, strict=True) if stop.which is not None]
+        out += exact
         begin = kept[last] + 1
     out += knots[begin:]
     return _Path(out, np.array([knot.macroscopic for knot in out]), found)
@@ -238,10 +238,9 @@ def _bracketed(a: Knot, b: Knot, which: int, value: float, direct: Solution, tol
     if len(ends) < 2:
         raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
     target = float(np.log(value))
-    stops = [ends[0], *(turn.solution for turn in turns(ends, (which,))), ends[1]]
     found = [
         _on_stretch(*pair, which, value, tolerance)
-        for pair in pairwise(stops)
+        for pair in pairwise([stop.solution for stop in followed(ends, (which,))])
         if (pair[0].macroscopic[which] >= target) != (pair[1].macroscopic[which] >= target)
     ]
     if not found and direct.converged:

@@ -60,12 +60,13 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
-    """A flow at which the quantity ``which`` turns; ``place`` counts along the path: 2.5 is between flows 2 and 3."""
+class Stop:
+    """A flow of a branch at a ``place`` that counts along a path, such as 2.5 between its flows 2 and 3; the quantity
+    ``which`` turns there, if that is not None."""
 
-    which: int
     place: float
     solution: Solution
+    which: int | None = None
 
 
 def expansions(solutions: Sequence[Solution], ahead: Array) -> list[Expansion]:
@@ -146,28 +147,36 @@ def directions(path: Array) -> Array:
     return np.where(length > 0.0, ahead / np.where(length > 0.0, length, 1.0), np.eye(path.shape[1])[-1])
 
 
-def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Turn]:
+def turns(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Stop]:
     """Every flow between the first and the last of ``path``, successive flows of one branch, at which one of the
     quantities ``which`` turns, in order along it; but turns that differ by rounding alone.
 
     Raises:
         SolveError: where the branch could not be followed to one.
     """
-    if len(path) < 2:
-        return []
-    at = expansions(path, directions(np.array([s.macroscopic for s in path])))
-    models = Models.between(at[:-1], at[1:])
-    found = [
-        Turn(quantity, i + place, solution)
-        for i in np.flatnonzero(models.open(which)).tolist()
-        for quantity, place, solution in _between(at[i], at[i + 1], which, tolerance)
-    ]
-    found.sort(key=lambda turn: turn.place)
-    told = [turn for quantity in which for turn in _told([t for t in found if t.which == quantity], path)]
+    stops = followed(path, which, tolerance)
+    told = [turn for quantity in which for turn in _told([s for s in stops if s.which == quantity], path)]
     return sorted(told, key=lambda turn: turn.place)
 
 
-def _told(turns: list[Turn], path: Sequence[Solution]) -> list[Turn]:
+def followed(path: Sequence[Solution], which: Sequence[int], tolerance: float = TOLERANCE) -> list[Stop]:
+    """The flows of ``path`` and between them those at which one of the quantities ``which`` turns, and as many others
+    as it takes to find these, in order: from one to the next, the quantities are monotonic and the branch runs along
+    the chord.
+
+    Raises:
+        SolveError: where the branch could not be followed.
+    """
+    stops = [Stop(float(i), solution) for i, solution in enumerate(path)]
+    if len(path) < 2:
+        return stops
+    at = expansions(path, directions(np.array([s.macroscopic for s in path])))
+    for i in np.flatnonzero(Models.between(at[:-1], at[1:]).open(which)).tolist():
+        stops += _between(at[i], at[i + 1], which, tolerance, (float(i), i + 1.0))
+    return sorted(stops, key=lambda stop: stop.place)
+
+
+def _told(turns: list[Stop], path: Sequence[Solution]) -> list[Stop]:
     """The turns of one quantity without those that its errors may have made."""
     if not turns:
         return []
@@ -214,10 +223,10 @@ class Models:
         length = np.linalg.norm(gain, axis=1)
         row = gain / np.where(length > 0.0, length, 1.0)[:, None] ** 2
         with np.errstate(all="ignore"):
+            # Which way along the branch the parameters of the expansions grow does not matter.
             begin, end = _over_sigma(first, row), _over_sigma(last, row)
             # Cosine of the angle to the chord: d sigma per arclength, times the chord.
             cosines = [length / np.linalg.norm(part[0], axis=1) for part in (begin, end)]
-            forward = [np.isfinite(part[0]).all(axis=1) & (part[2] > 0.0) for part in (begin, end)]
             whole = 0.5 * (begin[0] + end[0]) + (begin[1] - end[1]) / 12.0
             bump = 5.0 * (gain - whole)  # in the middle coefficient; 3/8 of it in m'
             errors = np.array([a.solution.error + b.solution.error for a, b in zip(first, last, strict=True)])
@@ -233,9 +242,7 @@ class Models:
                 axis=-1,
             )
             size = np.maximum(np.abs(slope).max(axis=-1), length[:, None])
-            sure = (
-                (np.abs(bump) < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG) & forward[0] & forward[1]
-            )
+            sure = (np.abs(bump) < _SMALL * size).all(axis=1) & (np.minimum(*cosines) > _ALONG)
         return cls(slope, np.abs(bump), length, sure)
 
     def open(self, which: Sequence[int]) -> NDArray[np.bool_]:
@@ -248,22 +255,23 @@ class Models:
         return (self.length > 0.0) & ~(self.sure & monotonic.all(axis=1))
 
 
-def _over_sigma(at: Sequence[Expansion], row: Array) -> tuple[Array, Array, Array]:
-    """First and second derivatives (k, 4) with respect to sigma, which ``row`` (k, 4) gives, and that of sigma (k,)."""
+def _over_sigma(at: Sequence[Expansion], row: Array) -> tuple[Array, Array]:
+    """First and second derivatives (k, 4) with respect to sigma, which ``row`` (k, 4) gives."""
     first, second = np.array([e.first for e in at]), np.array([e.second for e in at])
     pace = (row * first).sum(axis=1)
     bend = (row * second).sum(axis=1)
     slope = first / pace[:, None]
-    return slope, (second - slope * bend[:, None]) / pace[:, None] ** 2, pace
+    return slope, (second - slope * bend[:, None]) / pace[:, None] ** 2
 
 
 def _between(
-    first: Expansion, last: Expansion, which: Sequence[int], tolerance: float
-) -> Iterator[tuple[int, float, Solution]]:
-    """The turns in a stretch: the quantity, the place from 0 to 1, and the flow."""
+    first: Expansion, last: Expansion, which: Sequence[int], tolerance: float, ends: tuple[float, float]
+) -> Iterator[Stop]:
+    """The turns in a stretch with these ``ends``, and the flows at which it was halved."""
     models = Models.between([first], [last])
     if not models.open(which)[0]:
         return
+    begin, end = ends
     chord = Chord(first.solution, last.solution, tolerance, in_space=True)
     brackets = {quantity: _brackets(models, quantity) for quantity in which if models.open((quantity,))[0]}
     short = float(models.length[0]) < _SHORTEST
@@ -274,14 +282,15 @@ def _between(
             for bracket in found or ()
         ]
         if short or all(turn is not None for _, turn in located):
-            yield from ((quantity, *turn) for quantity, turn in located if turn is not None)
+            for quantity, turn in located:
+                if turn is not None:
+                    yield Stop(begin + (end - begin) * turn[0], turn[1], quantity)
             return
-    middle = chord.at(0.5)
+    middle, halfway = chord.at(0.5), 0.5 * (begin + end)
+    yield Stop(halfway, middle)
     (between,) = expansions([middle], _unit(chord))
-    for quantity, place, turn in _between(first, between, which, tolerance):
-        yield quantity, 0.5 * place, turn
-    for quantity, place, turn in _between(between, last, which, tolerance):
-        yield quantity, 0.5 + 0.5 * place, turn
+    yield from _between(first, between, which, tolerance, (begin, halfway))
+    yield from _between(between, last, which, tolerance, (halfway, end))
 
 
 @dataclass(frozen=True)
@@ -344,7 +353,7 @@ def _located(chord: Chord, which: int, bracket: Bracket) -> tuple[float, Solutio
 
 def along(chord: Chord, solution: Solution) -> tuple[Array, Array]:
     """First and second derivatives (4,) of the quantities with respect to sigma at a flow of the stretch."""
-    first, second, _ = _over_sigma(expansions([solution], _unit(chord)), chord.row[None])
+    first, second = _over_sigma(expansions([solution], _unit(chord)), chord.row[None])
     return first[0], second[0]
 
 

@@ -1,0 +1,201 @@
+"""Turning points along a branch: exact derivatives, pairs just past a cusp, and what is said next to a fold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chuteflow import Chute, curve, flows
+from chuteflow.analysis.chords import Chord
+from chuteflow.analysis.families import traced_families
+from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.analysis.turns import EVERY, dips, distinct, expansions, may_turn, turns
+from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
+from chuteflow.steady.model import model
+
+PAPER = Chute(0.3, 0.8, 0.8, 0.6)
+#: Two folds in Q meet here: three flows of a flux become one.
+CUSP = 0.3629916485
+FOLDS = {1e-5: (897.18333, 897.193459), 3e-5: (899.026048, 899.078891), 1e-3: (991.68551, 1004.12061)}
+
+
+def branches(chute):
+    within = Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    return traced_families(model(chute), within)
+
+
+def folds(chute, kind, **given):
+    found = [s.flow for branch in curve(chute, **given).branches for s in branch.special if s.kind == kind]
+    return sorted(found, key=lambda flow: flow.mass_flux)
+
+
+@pytest.mark.parametrize("surface", ["free", "interface"])
+def test_derivatives_along_a_branch_are_those_of_its_flows(surface):
+    (branch,) = branches(replace(PAPER, surface=surface))
+    for i in range(3, len(branch.solutions) - 4, 4):
+        first, last = branch.solutions[i : i + 2]
+        chord = Chord(first, last, in_space=True)
+        middle = chord.at(0.5)
+        row = chord.row[None]
+        (at,) = expansions([middle], row / np.linalg.norm(row))
+        pace = float(chord.row @ at.first)
+        slope = at.first / pace
+        bend = (at.second - slope * float(chord.row @ at.second)) / pace**2
+        one, other = (chord.at(0.5 + step).macroscopic for step in (-1e-3, 1e-3))
+        np.testing.assert_allclose(slope, (other - one) / 2e-3, atol=1e-6)
+        np.testing.assert_allclose(bend, (other - 2.0 * middle.macroscopic + one) / 1e-6, atol=3e-5)
+
+
+def test_turns_of_all_four_quantities_are_extrema():
+    (branch,) = branches(Chute(0.3, 0.9, 0.6, 0.8))
+    found = turns(branch.solutions, EVERY)
+    assert sorted(turn.which for turn in found) == [0, 1, 2, 3]
+    for turn in found:
+        i = int(turn.place)
+        chord = Chord(branch.solutions[i], branch.solutions[i + 1], in_space=True)
+        values = [chord.at(turn.place - i + step).macroscopic[turn.which] for step in (-0.02, -0.01, 0.01, 0.02)]
+        off = np.array(values) - turn.solution.macroscopic[turn.which]
+        assert (np.sign(off) == np.sign(off[0])).all()
+        assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
+        assert off[3] / off[2] == pytest.approx(4.0, rel=0.1)
+
+
+def test_two_folds_between_two_flows_are_seen():
+    (branch,) = branches(Chute(CUSP + 1e-5, 0.8, 0.8, 0.6))
+    found = [turn for turn in turns(branch.solutions, (LOG_Q,)) if turn.solution.macroscopic[LOG_Q] > np.log(500.0)]
+    assert len(found) == 2
+    assert int(found[0].place) == int(found[1].place)
+    fluxes = sorted(np.exp(turn.solution.macroscopic[LOG_Q]) for turn in found)
+    assert fluxes == pytest.approx(FOLDS[1e-5], abs=2e-6)
+
+
+def test_two_folds_far_between_two_flows_are_seen():
+    # The chord is long, and the folds are far from its ends and from its middle.
+    (branch,) = branches(Chute(CUSP + 1e-4, 0.8, 0.8, 0.6))
+    every = branch.solutions
+    low, high = (int(turn.place) for turn in turns(every, (LOG_Q,))[:2])
+    for wide in (1, 2, 3):
+        ends = [every[low - wide], every[high + 1 + wide]]
+        assert len(turns(ends, (LOG_Q,))) == 2
+
+
+@pytest.mark.parametrize(("beyond", "expected"), FOLDS.items())
+def test_folds_do_not_depend_on_the_points_of_the_curve(beyond, expected):
+    for points in (2, 10, 30, 200):
+        found = folds(Chute(CUSP + beyond, 0.8, 0.8, 0.6), "fold-Q", points=points)
+        assert [flow.mass_flux for flow in found[1:]] == pytest.approx(expected, rel=2e-8), points
+
+
+@pytest.mark.slow
+def test_special_points_are_the_same_for_ten_points_and_for_four_thousand():
+    for chute in (PAPER, Chute(CUSP + 1e-5, 0.8, 0.8, 0.6), Chute(0.29, 0.9, 0.8, 0.7), Chute(0.3, 0.9, 0.6, 0.8)):
+        for few, many in zip(curve(chute, points=10).branches, curve(chute, points=4000).branches, strict=True):
+            assert [s.kind for s in few.special] == [s.kind for s in many.special]
+            for one, other in zip(few.special, many.special, strict=True):
+                assert one.flow.mass_flux == pytest.approx(other.flow.mass_flux, rel=1e-8)
+                # The position is that of the flow just before it.
+                for point, branch in ((one, few), (other, many)):
+                    before, after = branch.surface_temperature[point.position : point.position + 2]
+                    between = sorted([before, after, point.flow.surface_temperature])[1]
+                    assert point.kind == "fold-T" or between == pytest.approx(point.flow.surface_temperature, rel=1e-9)
+
+
+def test_four_flows_of_one_flux_between_two_folds_past_a_cusp():
+    found = flows(Chute(0.3630916485143, 0.8, 0.8, 0.6), Q=905.627)
+    assert [flow.mass_holdup for flow in found] == pytest.approx(
+        [1.2321960, 7.8437031, 7.87705133, 7.91270504], rel=1e-7
+    )
+    assert [flow.surface_temperature for flow in found[2:]] == pytest.approx([0.78715584, 0.63827869], rel=1e-7)
+    for flow in found:
+        assert flow.mass_flux == pytest.approx(905.627, rel=1e-11)
+
+
+def test_just_past_a_cusp_flows_are_counted_on_both_sides_of_both_folds():
+    chute = Chute(CUSP + 1e-5, 0.8, 0.8, 0.6)
+    low, high = (flow.mass_flux for flow in folds(chute, "fold-Q", points=10)[1:])
+    gap = high - low
+    for flux, expected in ((low - 0.1 * gap, 2), (low + 0.1 * gap, 4), (high - 0.1 * gap, 4), (high + 0.1 * gap, 2)):
+        assert len(flows(chute, Q=flux)) == expected
+
+
+def test_a_search_that_starts_at_a_fold_finds_both_flows():
+    chute = Chute(0.2235282153342192, 0.9211854930464662, 0.8044288256031973, 0.6997605976034021)
+    found = flows(chute, T_surface=0.161)
+    assert [flow.mass_holdup for flow in found] == pytest.approx([0.20658356, 0.23873600], rel=1e-7)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_next_to_a_fold_every_flow_has_an_honest_error(side):
+    fold = folds(PAPER, "fold-Q", surface_temperature=(0.01, 500.0), points=10)[side]
+    inward = -1.0 if side else 1.0
+    (far,) = flows(PAPER, Q=fold.mass_flux * (1.0 - 1e-6 * inward))
+    for apart in (0.0, 1e-15, 1e-13, 3e-13, 1e-12, 1e-11, 1e-10):
+        found = flows(PAPER, Q=fold.mass_flux * (1.0 + apart * inward))
+        near = [flow for flow in found if abs(flow.mass_holdup - fold.mass_holdup) < 0.1 * fold.mass_holdup]
+        assert 1 <= len(near) <= 2
+        assert len(near) == 2 or apart < 1e-12
+        assert len(found) == len(near) + 1
+        (other,) = (flow for flow in found if flow not in near)
+        assert other.mass_holdup == pytest.approx(far.mass_holdup, rel=1e-5)
+        # The two flows move apart with the root of the distance: where they are is known to their errors.
+        beside = flows(PAPER, Q=fold.mass_flux * (1.0 + 1e-6 * inward))
+        scale = max(
+            abs(flow.mass_holdup / fold.mass_holdup - 1.0)
+            for flow in beside
+            if flow.mass_holdup in [f.mass_holdup for f in beside if abs(f.mass_holdup / fold.mass_holdup - 1.0) < 0.1]
+        )
+        for flow in near:
+            off = abs(abs(flow.mass_holdup / fold.mass_holdup - 1.0) - scale * np.sqrt(apart / 1e-6))
+            assert off <= 1.5 * flow.error + 2e-3 * scale * np.sqrt(apart / 1e-6) + 2e-8
+            assert flow.error < 1e-4
+
+
+def test_beyond_a_fold_by_more_than_its_error_there_is_no_flow_of_it():
+    low, high = folds(PAPER, "fold-Q", surface_temperature=(0.01, 500.0), points=10)
+    assert len(flows(PAPER, Q=low.mass_flux * (1.0 - 1e-9))) == 1
+    assert len(flows(PAPER, Q=high.mass_flux * (1.0 + 1e-9))) == 1
+
+
+def test_turns_that_rounding_makes_are_none():
+    # A deep branch along which the surface temperature is the same to ten digits.
+    chute = Chute(0.4191510618260981, 0.7559395567904552, 0.6770602401681308, 0.5726889224411995)
+    (branch,) = branches(chute)
+    assert np.ptp(branch.macroscopic[:4, LOG_T]) < 1e-8
+    assert turns(branch.solutions[:6], (LOG_T,)) == []
+
+
+def test_values_that_are_one_are_no_turns():
+    assert distinct([0.0, 1.0, 0.2, 3.0], [0.1, 0.1, 0.1]) == [0, 1, 2, 3]
+    assert distinct([0.0, 1.0, 0.95, 3.0], [0.1, 0.1, 0.1]) == [0, 3]
+    assert distinct([0.0, 1.0, 0.95], [0.1, 0.1]) == [0, 2]
+    assert distinct([0.0, 0.05, -2.0, 1.0], [0.1, 0.1, 0.1]) == [0, 2, 3]
+
+
+def test_rough_slopes_tell_where_a_quantity_may_turn():
+    place = np.linspace(-1.0, 1.0, 9)
+    # Of s^3 - s^2/100 both turns lie in one step, and the values rise throughout.
+    values = place**3 - 0.01 * place
+    marked = may_turn(np.diff(values) / np.diff(place))
+    assert marked[[3, 4]].all()
+    assert not marked[[0, 1, 6, 7]].any()
+    assert not may_turn(np.diff(np.exp(place)) / np.diff(place)).any()
+    # A step alone tells nothing; one that is missing is no step.
+    assert may_turn(np.array([np.nan, 1.0, np.nan])).tolist() == [False, True, False]
+
+
+def test_a_dip_between_two_points_is_seen_with_its_zeros():
+    place = np.array([-1.5, -0.7, 0.4, 1.2])
+    (dip,) = dips(place**2 - 0.09, place)
+    assert dip.step == 1
+    assert dip.value < 0.0
+    zeros = [place[1] + share * (place[2] - place[1]) for share in dip.zeros]
+    assert zeros == pytest.approx([-0.3, 0.3], abs=0.1)
+    assert [dip.zeros for dip in dips(place**2 + 0.3, place)] == [()]
+
+
+def test_the_centre_of_mass_may_turn_too():
+    chute = Chute(CUSP + 1e-5, 0.8, 0.8, 0.6)
+    (branch,) = branches(chute)
+    height = turns(branch.solutions, (LOG_H,))[0].solution.macroscopic[LOG_H]
+    counts = [len(flows(chute, h=float(np.exp(height + off)))) for off in (-1e-6, 1e-6)]
+    assert abs(counts[0] - counts[1]) == 2
