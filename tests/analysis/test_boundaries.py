@@ -271,6 +271,7 @@ def test_the_names_are_at_the_top_of_the_package(folds):
     assert isinstance(folds[0], chuteflow.Boundary)
 
 
+@pytest.mark.slow
 def test_a_boundary_holds_its_own_points():
     # Deep, cold flows at its end are not resolved to the tolerance where they are solved once more.
     found = boundary(replace(PAPER, slope=0.373), bounds=(0.373, 0.3747), samples=2)

@@ -35,11 +35,11 @@ def test_two_flows_near_a_turn_are_found(parameters, height):
 def test_just_past_a_cusp_no_lane_is_settled_with_flows_missing():
     parameters, fluxes = [], []
     for beyond, low, high in ((1e-4, 905.464237, 905.790341), (1e-3, 991.68551, 1004.12061)):
-        for share in (-0.5, 0.1, 0.5, 0.9, 1.5):
+        for share in (-0.5, 0.5, 1.5):
             parameters.append((0.3629916485 + beyond, 0.8, 0.8, 0.6))
             fluxes.append(low + share * (high - low))
     count, unsettled, _ = swept(parameters, LOG_Q, fluxes)
-    expected = np.tile([2, 4, 4, 4, 2], 2)
+    expected = np.tile([2, 4, 2], 2)
     assert (unsettled | (count == expected)).all()
 
 

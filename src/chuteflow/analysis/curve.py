@@ -97,9 +97,10 @@ def _branch(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: flo
 def _folds(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which Q, M or T_surface turns, with their arclengths."""
     path, at = family.path(stretch)
-    kinds = {which: kind for kind, which in _FOLDS.items()}
-    for turn in turns(path, tuple(kinds), tolerance):
-        yield kinds[turn.which], Flow(chute, turn.solution), float(np.interp(turn.place, np.arange(len(at)), at))
+    found = turns(path, tuple(_FOLDS.values()), tolerance)
+    for kind, which in _FOLDS.items():
+        for turn in (turn for turn in found if turn.which == which):
+            yield kind, Flow(chute, turn.solution), float(np.interp(turn.place, np.arange(len(at)), at))
 
 
 def _changes(
