@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from chuteflow import Chute, curve, flows, load, save
 from chuteflow.analysis.counting import flux_counts
 from chuteflow.analysis.ranges import CLOSED, VANISHES
+from chuteflow.analysis.results import FlowSet
 from chuteflow.faces import contract, words
 from chuteflow.faces.commands.curve import command as curve_command
 from chuteflow.faces.commands.solve import command as solve_command
@@ -78,7 +79,9 @@ def test_a_flux_to_which_a_branch_may_lead_is_not_called_complete(tmp_path):
     assert flows(PAPER, Q=3.0).incomplete is None
     assert flows(TUTORIAL, Q=25.0, surface_temperature=RANGE).incomplete is None
     save(found, tmp_path / "flows.json")
-    assert load(tmp_path / "flows.json").incomplete == found.incomplete
+    loaded = load(tmp_path / "flows.json")
+    assert isinstance(loaded, FlowSet)
+    assert loaded.incomplete == found.incomplete
     assert contract.flow_set_object(found)["incomplete"] == found.incomplete
 
 
