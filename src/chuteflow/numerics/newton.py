@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def solve_each(matrices: Array, sides: Array) -> Array:
     A member whose matrix is singular gets NaN: with :func:`numpy.linalg.solve` it would end all.
     """
     try:
-        return np.linalg.solve(matrices, sides)
+        return cast(Array, np.linalg.solve(matrices, sides))
     except np.linalg.LinAlgError:
         if matrices.ndim == 2:
             return np.full(sides.shape, np.nan)

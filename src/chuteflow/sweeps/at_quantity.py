@@ -48,7 +48,9 @@ _BEYOND = 1.1
 _ASIDE, _AWAY, _LITTLE = 1.0, 1.0, 1e-3
 #: Between columns a quantity departs from its values there by at most this part of what its slope changes over the
 #: step; and what rough columns may be off.
-_SAG, _NOISE = 0.5, 1e-4
+_SAG, _NOISE = 0.5, 2e-5
+#: In steps of ln T narrower than this rough columns do not tell turns from noise: such lanes are searched one by one.
+_NARROWEST = 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
 #: A flow meets the value asked for to this.
@@ -155,19 +157,20 @@ def at_quantity(
         unsettled[columns.lane[columns.count < 0]] = True
         unsettled[columns.lane[_deeper(problem, columns)]] = True
         columns = columns.of(~unsettled)
-        found, split = _links(problem, columns)
+        found, split, lost = _links(problem, columns)
+        unsettled[columns.lane[lost]] = True
         # A lane is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
         ready[columns.lane[split]] = False
         ready &= ~unsettled
         brackets.append(_chosen(found, ready))
-        columns = columns.of(~ready & ~unsettled)
-        if not columns.lane.size:
+        going = ~ready & ~unsettled
+        if not going[columns.lane].any():
+            columns = columns.of(going)
             break
-        _, split = _links(problem, columns)
-        gap = columns.log_t[split + 1] - columns.log_t[split]
-        middle = columns.log_t[split] + 0.5 * gap
-        columns = columns.joined(problem.columns(columns.lane[split], middle))
+        split = split[going[columns.lane[split]]]
+        middle = 0.5 * (columns.log_t[split] + columns.log_t[split + 1])
+        columns = columns.joined(problem.columns(columns.lane[split], middle)).of(going)
     unsettled[columns.lane] = True
     whole = Brackets(*(np.concatenate(part) for part in zip(*(vars(b).values() for b in brackets), strict=True)))
     flows, failed = _found(problem, whole, tolerance)
@@ -217,9 +220,9 @@ def _chosen(brackets: Brackets, lanes: NDArray[np.bool_]) -> Brackets:
     return Brackets(*(part[keep] for part in vars(brackets).values()))
 
 
-def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
-    """The flows that lie between columns that go over into each other, and the columns after which there is a gap that
-    may hide more, and wants a column."""
+def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indices]:
+    """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
+    hide more, and wants a column, and those after which columns do not tell."""
     left = np.flatnonzero(columns.lane[1:] == columns.lane[:-1])
     right = left + 1
     lane = columns.lane[left]
@@ -237,7 +240,8 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
     linked = place < first[:, None]
     crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
     split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, step, deepest)
-    split |= _turning(columns, left, linked, off_a, off_b)
+    turning = _turning(columns, left, linked, off_a, off_b)
+    split |= turning
     rows, places = np.nonzero(crossing)
     log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
     found = Brackets(
@@ -249,7 +253,7 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
         off_b[rows, places],
         log_m,
     )
-    return found, left[split]
+    return found, left[split], left[turning & (step < _NARROWEST)]
 
 
 def _unlinked(
@@ -309,8 +313,8 @@ def _turning(
     turns = may_turn(slope, noise)[left]
     reach = _SAG * step * np.nan_to_num(np.fmax(change[1:], change[:-1])[left]) + _NOISE
     with np.errstate(invalid="ignore"):
-        near = (np.minimum(off_a, off_b) <= reach) & (np.maximum(off_a, off_b) >= -reach)
-    return (near & turns).any(axis=1)
+        turns &= (np.minimum(off_a, off_b) <= reach) & (np.maximum(off_a, off_b) >= -reach)
+    return turns.any(axis=1)
 
 
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
