@@ -47,8 +47,8 @@ def curve(
 
     Args:
         chute: the chute.
-        points: flows on the longest branch, evenly in arclength in the plane (ln T_surface, ln M); shorter
-            branches take fewer in proportion.
+        points: flows on the longest branch, evenly in arclength in the space of ln Q, ln h, ln M and ln T_surface;
+            shorter branches take fewer in proportion.
         tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
         surface_temperature: range of T_surface.
         largest_holdup: largest M.

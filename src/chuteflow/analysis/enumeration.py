@@ -26,6 +26,8 @@ from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
 _LEADS = 0.25
+#: The range is not extended to larger hold-ups where there are more branches: their number would grow.
+_MOST_DEEPER = 4
 #: Flows whose ln Q, ln h, ln M and ln T_surface differ by less are one flow.
 _SAME = 1e-9
 #: The range reaches this factor beyond a flow that was found just outside.
@@ -172,14 +174,16 @@ def _left_out(found: _Search, which: int, value: float) -> str | None:
     return None
 
 
-def _wider(search: _Search, which: int, value: float) -> Range:
-    """The range with which families that lead out of it towards ``value`` reach it."""
-    within = wider = search.within
-    for lead in _leads(search, which, value):
-        wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))
-    # The rough end of a family may have passed the value inside the range, and the flow itself not.
-    for solution in search.beyond:
-        for axis in (LOG_T, LOG_M):
+def _wider(found: _Search, which: int, value: float) -> Range:
+    """The range with which branches that lead out of it towards ``value`` reach it."""
+    within = wider = found.within
+    axes = (LOG_T, LOG_M) if len(found.families) <= _MOST_DEEPER else (LOG_T,)
+    for lead in _leads(found, which, value):
+        if lead.axis in axes:
+            wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))
+    # The rough end of a branch may have passed the value inside the range, and the flow itself not.
+    for solution in found.beyond:
+        for axis in axes:
             there = float(np.exp(solution.macroscopic[axis]))
             if within.reaching(axis, there) != within:
                 outward = _ASIDE if axis == LOG_M or there > within.hottest else 1.0 / _ASIDE

@@ -27,8 +27,8 @@ _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
 _SHARP = 0.8
 #: A solved flow lies within this of the rough one, and this fraction of the spacing.
 _ROUGH, _ASTRAY = 0.03, 0.3
-#: Where a rough quantity comes as near to the value asked for, the branch is solved there.
-NEAR = 0.01
+#: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the spacing.
+NEAR, _PER_SPACING = 0.005, 0.15
 #: One flow is solved at once where the quantity changes by more than this along the branch, per length.
 _STEEP = 0.15
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
@@ -74,6 +74,11 @@ class Family:
         size = float(np.linalg.norm(chord))
         return chord / size if size > 0.0 else None
 
+    def _bend(self, i: int) -> float:
+        """How far the rough flow lies beside the chord of its neighbours."""
+        m = self.macroscopic
+        return float(np.linalg.norm(m[i] - 0.5 * (m[max(i - 1, 0)] + m[min(i + 1, len(m) - 1)])))
+
     def solved(self, i: int, tolerance: float) -> Point | None:
         """The flow at rough flow ``i``: in the plane normal to the branch, or at the edge of the range. None where it
         is not found near there."""
@@ -88,14 +93,16 @@ class Family:
                 weights = np.zeros(4)
                 weights[edge[0]], value = sign, sign * edge[1]
         point = point_at(self.rough.start(i), weights, value, tolerance)
-        if point is None or np.linalg.norm(point.m - self.macroscopic[i]) > _ROUGH + _ASTRAY * _SPACING:
+        if point is None or np.linalg.norm(point.m - self.macroscopic[i]) > _ROUGH + _ASTRAY * _SPACING + self._bend(i):
             return None
         return point
 
     def _solved_from(self, begin: int, end: int, tolerance: float) -> list[Point]:
         found: list[Point] = []
         for i in self._spaced(begin, end):
-            point = self.solved(i, tolerance)
+            # Where one rough flow leads nowhere its neighbour may.
+            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if begin <= k <= end)
+            point = next((point for point in tries if point is not None), None)
             if point is not None and not (found and _is_behind(point, found[-1])):
                 found.append(point)
         return found
@@ -171,7 +178,9 @@ def crossings(
     m = family.macroscopic
     off = m[:, which] - target
     bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
-    near = np.abs(off) < NEAR + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    spacing = np.diff(family.arclength, prepend=0.0)
+    rough = NEAR + _PER_SPACING * np.maximum(spacing, np.append(spacing[1:], 0.0))
+    near = np.abs(off) < rough + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
     found: list[Solution] = []
@@ -238,7 +247,8 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
     pieces."""
     points = family.points(begin, end, tolerance)
     placed = [(float(i), point) for i, point in enumerate(points)]
-    placed += [(turn.place, turn.point) for turn in turns(points, which, tolerance)]
+    turning = turns(points, which, tolerance)
+    placed += [(turn.place, turn.point) for turn in turning]
     placed.sort(key=lambda pair: pair[0])
     found = []
     for (_, one), (_, other) in pairwise(placed):
@@ -246,7 +256,19 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
             _, point = find_value(Chord(one, other, tolerance), which, target)
             found.append(_polished(point, which, target, tolerance))
+    for turn in turning:
+        # A fold that is at the value to its error is one flow, unless two were found beside it.
+        near = turn.point.solution
+        close = abs(float(turn.point.m[which]) - target) <= near.error
+        reach = 2.0 * float(np.sqrt(near.error))
+        if close and not any(np.linalg.norm(s.macroscopic - near.macroscopic) < reach for s in found):
+            found.append(_at_fold(near))
     return found
+
+
+def _at_fold(near: Solution) -> Solution:
+    """A flow at a fold in the quantity asked for: there the others are known to the root of the error."""
+    return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 
 def _polished(point: Point, which: int, target: float, tolerance: float) -> Solution:

@@ -127,8 +127,13 @@ class Chord:
         return _point_between(self.first.solution, self.last.solution, sigma, self.tolerance)
 
     def slope(self, point: Point) -> Array:
-        """Derivatives (4,) of the quantities with respect to sigma at a point."""
+        """Derivatives (4,) of the quantities with respect to sigma at a point, to about 1e-6."""
         return point.tangent * (self.length / float(point.tangent @ self.direction))
+
+    def sharp_slope(self, point: Point) -> Array:
+        """The same to rounding: at the flow itself, not at the last but one step of Newton's method."""
+        found = point.solution.elements.direction(self.direction)
+        return self.slope(point) if found is None else found[0] * self.length
 
 
 def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point]:
@@ -224,7 +229,7 @@ def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Po
         if chord.length < _SHORTEST:
             return
     elif not small and (chord.length < _SHORTEST or (unknown < _KNOWN and not 0.0 < turning < 1.0)):
-        yield _located(chord, lambda point: (float(chord.slope(point)[which]), None), (begin, end))
+        yield _located(chord, lambda point: (float(chord.sharp_slope(point)[which]), None), (begin, end))
         return
     middle = _halfway(chord)
     at = chord.place(middle.m)

@@ -22,6 +22,8 @@ TOLERANCE = 1e-10
 _FLOOR, _SAFETY = 1e-12, 4.0
 #: Newton's method ends with a step below this, after which the next one would be below rounding; steps at most.
 _STEP, _MOST_STEPS = 1e-7, 40
+#: The hold-up fixes a flow where it is this part of the change along the branch.
+_STEEP = 0.05
 #: A grid resolves a flow where the coefficients of g and y decay to this, and the integrals agree to the second.
 _RESOLVED, _AGREES = 1e-11, 1e-10
 
@@ -122,11 +124,13 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
 def collocate(solution: Solution) -> tuple[Collocation, Array]:
     """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.
 
-    Newton's method on the grid, in the plane through the flow across its branch: profiles are then as accurate as the
-    integrals over the depth. Where not even the last grid resolves it, they have the digits of the elements there.
+    Newton's method on the grid, at the same hold-up, or beside a fold in it across the branch: profiles are then as
+    accurate as the integrals over the depth. Where not even the last grid resolves it, they have the digits of the elements there.
     """
     rates = solution.rates
-    weights = np.array([0.0, 0.0, 0.0, 1.0]) if rates is None else rates / np.linalg.norm(rates)
+    weights = np.array([0.0, 0.0, 1.0, 0.0])
+    if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
+        weights = rates / np.linalg.norm(rates)
     value = np.array(float(weights @ solution.macroscopic))
     last = None
     for problem, rough in solution.elements.grids():

@@ -48,7 +48,7 @@ class Refinement:
 
     delta: float = 0.4
     finest: float = 0.025
-    per_decade: float = 6.0
+    per_decade: float = 12.0
     step: float = 0.25
     lengths: float = 0.6
     most: int = 1_200_000
@@ -58,7 +58,7 @@ class Refinement:
 REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
-_THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
+_THIN, _THIN_STEP, _LEAST = 80, 0.25, 5e-10
 
 
 @dataclass(frozen=True, eq=False)
