@@ -269,3 +269,25 @@ def test_only_folds_bound_numbers_of_flows(onset):
 def test_the_names_are_at_the_top_of_the_package(folds):
     assert isinstance(folds, chuteflow.BoundarySet)
     assert isinstance(folds[0], chuteflow.Boundary)
+
+
+@pytest.mark.slow
+def test_a_boundary_holds_its_own_points():
+    # Deep, cold flows at its end are not resolved to the tolerance where they are solved once more.
+    found = boundary(replace(PAPER, slope=0.373), bounds=(0.373, 0.3747), samples=2)
+    lines = [line.traced for line in found]
+    assert len(lines) == 2
+    for line, other in (lines, lines[::-1]):
+        assert all(line.holds(point) for point in (*line.points[:3], *line.points[-3:]))
+        assert not any(line.holds(point) for point in other.points[::8])
+
+
+@pytest.mark.slow
+def test_each_boundary_is_listed_once():
+    found = boundary(replace(PAPER, slope=0.34), bounds=(0.34, 0.38), samples=9)
+    assert len(found) == 2
+    assert [turn.kind for line in found for turn in line.special] == ["cusp"]
+    line, other = (b.traced for b in found)
+    assert line.repeats(line)
+    assert not line.repeats(other)
+    assert not other.repeats(line)

@@ -6,6 +6,7 @@ import pytest
 from chuteflow import Chute, InputError, curve, domain, flows, hot
 from chuteflow.analysis.domains import CODES, exists_at
 from chuteflow.analysis.domains.columns import Part, alike
+from chuteflow.analysis.domains.kinds import _monotonic_pieces, _most
 from chuteflow.analysis.domains.plane import code
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
@@ -246,3 +247,14 @@ def test_what_cannot_be_mapped_is_refused(changed, what):
     given = {"x": ("slope", 0.1, 0.5), "y": ("roughness", 0.5, 0.8)} | changed
     with pytest.raises(InputError, match=what):
         domain(Chute(0.3, 0.8, 0.8, 0.6), **given)
+
+
+def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
+    # ln Q = s^3 - s/4 along a family, between whose points it rises throughout.
+    s = np.array([-1.2, -0.8, -0.55, 0.55, 0.8, 1.2])
+    log_q, rise = s**3 - 0.25 * s, 3.0 * s**2 - 0.25
+    assert (np.diff(log_q) > 0.0).all()
+    assert (rise > 0.0).all()
+    pieces = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
+    assert _most(pieces) == 3
+    assert _most(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1

@@ -1,23 +1,23 @@
 """Every steady flow of a chute at a given flux, hold-up, centre of mass or surface temperature.
 
-The families of flows come from the landscape of trajectories (:mod:`chuteflow.analysis.families`), which
-misses none. Along each, the flows that meet the condition are where the quantity crosses its value
-(:mod:`chuteflow.analysis.crossings`).
+The branches of flows come from the grid of trajectories (:mod:`chuteflow.trajectories.refining`). Along each, the flows
+that meet the condition are where the quantity takes its value (:mod:`chuteflow.analysis.families`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from chuteflow.analysis.crossings import crossings
 from chuteflow.analysis.existence import reason_for_none
-from chuteflow.analysis.families import MOST_TRACED, Family, families
+from chuteflow.analysis.families import Family, crossings, families, search
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.analysis.results import FlowSet, Searched
 from chuteflow.checks import number
-from chuteflow.errors import InputError, SolveError
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import flows_of
@@ -28,12 +28,10 @@ from chuteflow.threads import on_one_thread
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
 _LEADS = 0.25
-#: The range is not extended to larger hold-ups where there are more traced families: their number would grow.
-_MOST_DEEPER = 3
-#: With more of them it is not extended at all: there would soon be more than can be traced.
-_MOST_WIDER = MOST_TRACED - 4
-#: Flows whose ln M and ln T_surface differ by less are one flow.
-_SAME = 1e-7
+#: The range is not extended to larger hold-ups where there are more branches: their number would grow.
+_MOST_DEEPER = 4
+#: Flows whose ln Q, ln h, ln M and ln T_surface differ by less are one flow.
+_SAME = 1e-9
 #: The range reaches this factor beyond a flow that was found just outside.
 _ASIDE = 1.2
 _QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
@@ -67,7 +65,6 @@ def flows(
 
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
-        SolveError: where a flow that was seen could not be solved to the tolerance.
     """
     which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
@@ -76,41 +73,49 @@ def flows(
         # Well inside, so that a turn near the value is seen from both sides.
         within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
     problem = model(chute)
-    search = _search(problem, which, value, tolerance, within)
+    found = _search(problem, which, value, tolerance, within)
     for _ in range(_EXTENSIONS):
-        wider = _wider(search, which, value)
-        if wider == search.within or sum(family.traced for family in search.families) > _MOST_WIDER:
+        wider = _wider(found, which, value)
+        if wider == found.within or found.carried < found.within.deepest * (1.0 - 1e-9):
             break
-        try:
-            search = _search(problem, which, value, tolerance, wider)
-        except SolveError:
-            break  # what the narrower range holds is complete in itself
+        found = _search(problem, which, value, tolerance, wider)
     return FlowSet(
         chute=chute,
-        flows=tuple(flows_of(chute, search.solutions)),
-        searched=Searched((search.within.coldest, search.within.hottest), search.within.deepest),
+        flows=tuple(flows_of(chute, found.solutions)),
+        searched=Searched((found.within.coldest, found.within.hottest), found.within.deepest),
         tolerance=tolerance,
         reason=None
-        if search.solutions
-        else reason_for_none(problem, [f.macroscopic for f in search.families], which, value, search.within),
+        if found.solutions
+        else reason_for_none(problem, [f.macroscopic for f in found.families], which, value, found.within),
+        incomplete=_left_out(found, which, value),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """The families in a range, the flows among them that meet a condition, and those found just ``beyond`` it."""
+    """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
+    rough quantities of flows that were seen and not solved, and the hold-up down to which the search was
+    ``carried``."""
 
     within: Range
     families: tuple[Family, ...]
     solutions: list[Solution]
     beyond: list[Solution]
+    lost: list[Array]
+    carried: float
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
-    found = families(problem, within, value if which == LOG_M else 0.0)
-    solutions = [s for family in found for s in crossings(family.knots, which, value, tolerance)]
+    found = families(problem, within)
+    solutions: list[Solution] = []
+    lost: list[Array] = []
+    for family in found:
+        solved, missed = crossings(family, which, value, tolerance)
+        solutions += solved
+        lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)])
-    return _Search(within, found, inside, [s for s in solutions if not within.contains(s.macroscopic)])
+    beyond = [s for s in solutions if not within.contains(s.macroscopic)]
+    return _Search(within, found, inside, beyond, lost, search(problem, within).deepest)
 
 
 def _asked(given: dict[str, float | None]) -> tuple[int, float]:
@@ -123,25 +128,59 @@ def _asked(given: dict[str, float | None]) -> tuple[int, float]:
     return _QUANTITIES[name], number(name, raw, low, high)
 
 
-def _wider(search: _Search, which: int, value: float) -> Range:
-    """The range with which families that lead out of it towards ``value`` reach it."""
+@dataclass(frozen=True)
+class _Lead:
+    """Where a family leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
+    LOG_T or LOG_M, there to reach the value at about ``place``, a logarithm."""
+
+    axis: int
+    edge: int
+    place: float
+
+
+def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
     target = float(np.log(value))
-    within = wider = search.within
-    deeper = sum(family.traced for family in search.families) <= _MOST_DEEPER
-    axes = (LOG_T, LOG_M) if deeper else (LOG_T,)
     for family in search.families:
         m = family.macroscopic
         for end, before in ((m[0], m[1]), (m[-1], m[-2])) if len(m) > 1 else ():
             left = target - float(end[which])
-            for axis in axes:
-                edge = within.edge(end, axis)
+            for axis in (LOG_T, LOG_M):
+                edge = search.within.edge(end, axis)
                 run = float(end[axis] - before[axis])
                 slope = float(end[which] - before[which]) / run if run else 0.0
                 if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
-                    reach = np.clip(float(end[axis]) + 1.2 * left / slope + edge, -600.0, 600.0)
-                    wider = wider.reaching(axis, float(np.exp(reach)))
-    # The rough end of a family may have passed the value inside the range, and the flow itself not.
-    for solution in search.beyond:
+                    yield _Lead(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
+
+
+def _left_out(found: _Search, which: int, value: float) -> str | None:
+    """What the search leaves open, in words: flows not solved, depths not reached, branches not followed to where they
+    may have the value."""
+    if found.lost:
+        mass, temperature = np.exp(found.lost[0][LOG_M:])
+        many = f"{len(found.lost)} flows were" if len(found.lost) > 1 else "a flow was"
+        return f"{many} seen and not solved, near M = {mass:.4g} and T_surface = {temperature:.4g}"
+    if found.carried < found.within.deepest * (1.0 - 1e-9):
+        return f"beyond a hold-up of {found.carried:.4g} there are too many flows to search"
+    for lead in _leads(found, which, value):
+        if lead.axis == LOG_M:
+            there = f"hold-ups above {found.within.deepest:g}"
+        elif lead.edge > 0:
+            there = f"surface temperatures above {found.within.hottest:g}"
+        else:
+            there = f"surface temperatures below {found.within.coldest:g}"
+        return f"a branch goes on to {there}, outside the range searched"
+    return None
+
+
+def _wider(found: _Search, which: int, value: float) -> Range:
+    """The range with which branches that lead out of it towards ``value`` reach it."""
+    within = wider = found.within
+    axes = (LOG_T, LOG_M) if len(found.families) <= _MOST_DEEPER else (LOG_T,)
+    for lead in _leads(found, which, value):
+        if lead.axis in axes:
+            wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))
+    # The rough end of a branch may have passed the value inside the range, and the flow itself not.
+    for solution in found.beyond:
         for axis in axes:
             there = float(np.exp(solution.macroscopic[axis]))
             if within.reaching(axis, there) != within:
@@ -154,6 +193,6 @@ def _distinct(solutions: list[Solution]) -> list[Solution]:
     """Without repetitions, hot to cold, then by hold-up."""
     kept: list[Solution] = []
     for s in solutions:
-        if all(np.abs(s.macroscopic - k.macroscopic)[LOG_M:].max() > _SAME for k in kept):
+        if all(np.abs(s.macroscopic - k.macroscopic).max() > _SAME + s.error + k.error for k in kept):
             kept.append(s)
     return sorted(kept, key=lambda s: (-s.macroscopic[LOG_T], s.macroscopic[LOG_M]))

@@ -1,341 +1,335 @@
-"""Families of flows: the zero set of the base condition on a grid of trajectories.
+"""Branches of flows in a range: found by the grid of trajectories, and solved where they are asked for.
 
-# notation: B = y - base(nu), the heat flux of a trajectory less that which a base there would give.
-
-All flows of a chute in a range of surface temperatures and hold-ups are the zeros of the one function
-B(T_surface, p). Its zero set on the structured grid of :mod:`chuteflow.analysis.trajectories` is traced cell
-by cell (marching squares). Where neighbouring trajectories tear apart (one turns hot, one cold), the zero set
-between them runs to large hold-ups, closer to the dividing trajectory than any grid: a chain is cut there,
-and its family is followed by continuation instead.
+# notation: m the macroscopic quantities (ln Q, ln h, ln M, ln T_surface).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
-from contourpy import contour_generator
-from numpy.typing import NDArray
 
-from chuteflow.analysis.crossings import Knot, solved
-from chuteflow.analysis.ranges import Range
-from chuteflow.analysis.tracing import TracedFamily, solved_together, traced
-from chuteflow.analysis.trajectories import LOG_EMPTY, STEP, Trajectories, integrate, scan_table, surface_potential
+from chuteflow.analysis.paths import Chord, Point, Turn, find_value, point_at, refined, turns
+from chuteflow.analysis.ranges import CLOSED, Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.steady.collocation import LOG_M, Collocation
-from chuteflow.steady.model import CONDUCTION, Model
-from chuteflow.steady.solver import default_stretch
+from chuteflow.steady.model import Model
+from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
+from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
-#: Columns per decade of surface temperature, and the fewest.
-COLUMNS_PER_DECADE, FEWEST_COLUMNS = 12, 25
-#: Neighbouring columns are torn apart where ln x differs by more than this times ln T_surface.
-TORN = 5.0
-#: Families traced at most: in a narrow window of slopes their number grows with the hold-up without bound.
-MOST_TRACED = 16
-#: Columns put into a gap between columns that are torn apart, and how often the gap of a dividing trajectory is parted.
-_COLUMNS_IN_GAP, _PARTINGS = 8, 3
+#: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
+#: turned by an angle of the cosine.
+_TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
+#: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
+#: there is not known.
+_SHARP = 0.8
+#: A solved flow lies within this of the rough one, and this fraction of the spacing.
+_ROUGH, _ASTRAY = 0.03, 0.3
+#: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
+#: spacing.
+NEAR, _PER_SPACING = 0.005, 0.15
+#: One flow is solved at once where the quantity changes by more than this along the branch, per length.
+_STEEP = 0.15
+#: A rough end is at an edge of the range if it is as near to it in the logarithm.
+_AT_EDGE = 1e-6
+#: Points that differ by less are one.
+_SAME = 1e-8
+#: Why a branch ends where it is lost.
+LOST = "it could not be followed further"
 #: Searches whose result is remembered.
 _REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A family of flows as ``knots`` in order: rough flows, or solved ones where it was ``traced``."""
+    """A branch of flows in a range: rough flows in order, of which any are solved on request.
 
-    knots: tuple[Knot, ...]
-    traced: bool
+    ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3.
+    """
+
+    rough: RoughBranch
+    within: Range
+
+    @property
+    def macroscopic(self) -> Array:
+        """ln Q, ln h, ln M, ln T_surface of the rough flows, (k, 4)."""
+        return self.rough.macroscopic
 
     @cached_property
-    def macroscopic(self) -> Array:
-        """ln Q, ln h, ln M, ln T_surface of the knots, (k, 4)."""
-        return np.array([knot.macroscopic for knot in self.knots])
+    def arclength(self) -> Array:
+        """Along the rough flows, (k,)."""
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
+
+    def _direction(self, i: int) -> Array | None:
+        """Unit vector (4,) along the branch at rough flow ``i``; None where it turns sharply there."""
+        length, m = self.arclength, self.macroscopic
+        before = max(int(np.searchsorted(length, length[i] - _TOO_NEAR, side="right")) - 1, 0)
+        after = min(int(np.searchsorted(length, length[i] + _TOO_NEAR, side="left")), len(m) - 1)
+        sides = m[i] - m[before], m[after] - m[i]
+        sizes = [float(np.linalg.norm(side)) for side in sides]
+        if min(sizes) > 0.0 and float(sides[0] @ sides[1]) < _SHARP * sizes[0] * sizes[1]:
+            return None
+        chord = m[after] - m[before]
+        size = float(np.linalg.norm(chord))
+        return chord / size if size > 0.0 else None
+
+    def _bend(self, i: int) -> float:
+        """How far the rough flow lies beside the chord of its neighbours."""
+        m = self.macroscopic
+        return float(np.linalg.norm(m[i] - 0.5 * (m[max(i - 1, 0)] + m[min(i + 1, len(m) - 1)])))
+
+    def solved(self, i: int, tolerance: float) -> Point | None:
+        """The flow at rough flow ``i``: in the plane normal to the branch, or at the edge of the range. None where it
+        is not found near there."""
+        weights = self._direction(i)
+        if weights is None:
+            return None
+        value = float(weights @ self.macroscopic[i])
+        if i in (0, len(self.macroscopic) - 1) and not self.rough.closed:
+            edge = self.within.at_edge(self.macroscopic[i], _AT_EDGE)
+            if edge is not None:
+                sign = 1.0 if weights[edge[0]] >= 0.0 else -1.0
+                weights = np.zeros(4)
+                weights[edge[0]], value = sign, sign * edge[1]
+        point = point_at(self.rough.start(i), weights, value, tolerance)
+        if point is None or np.linalg.norm(point.m - self.macroscopic[i]) > _ROUGH + _ASTRAY * _SPACING + self._bend(i):
+            return None
+        return point
+
+    def _solved_from(self, begin: int, end: int, tolerance: float) -> list[Point]:
+        found: list[Point] = []
+        for i in self._spaced(begin, end):
+            # Where one rough flow leads nowhere its neighbour may.
+            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if begin <= k <= end)
+            point = next((point for point in tries if point is not None), None)
+            if point is not None and not (found and _is_behind(point, found[-1])):
+                found.append(point)
+        return found
+
+    def points(self, begin: int, end: int, tolerance: float) -> list[Point]:
+        """Points from rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
+
+        Raises:
+            SolveError: where the branch could not be followed.
+        """
+        found = self._solved_from(begin, end, tolerance)
+        if not found:
+            raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
+        return refined(found, tolerance)
+
+    def traced(self, tolerance: float) -> list[TracedFamily]:
+        """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
+        inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
+        if len(inside) < 2:
+            return []
+        found = self._solved_from(int(inside[0]), int(inside[-1]), tolerance)
+        if self.rough.closed and found:
+            found.append(found[0])
+        pieces: list[list[Point]] = [found[:1]]
+        for one, other in pairwise(found):
+            try:
+                pieces[-1] += refined([one, other], tolerance)[1:]
+            except SolveError:
+                pieces.append([other])
+        ends = [LOST] * (2 * len(pieces))
+        if self.rough.closed and len(pieces) == 1:
+            ends = [CLOSED, CLOSED]
+        elif found:
+            ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
+        return [
+            TracedFamily(tuple(piece), (begin, end))
+            for piece, begin, end in zip(pieces, ends[::2], ends[1::2], strict=True)
+            if len(piece) > 1
+        ]
+
+    def _spaced(self, begin: int, end: int) -> list[int]:
+        """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
+        length = self.arclength
+        kept, ahead = [begin], self._direction(begin)
+        for i in range(begin + 1, end):
+            step = length[i] - length[kept[-1]]
+            if step < _TOO_NEAR:
+                continue
+            here = self._direction(i)
+            if here is not None and (step > _SPACING or ahead is None or float(here @ ahead) < _TURNED):
+                kept.append(i)
+                ahead = here
+        return [*kept, end] if end > begin else kept
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def families(model: Model, within: Range, resolved_to: float = 0.0) -> tuple[Family, ...]:
-    """Every family of flows in the range: as chains of rough flows, or traced where a chain is torn.
+def families(model: Model, within: Range) -> tuple[Family, ...]:
+    """Every branch of flows in the range, as far as the refinement of the search resolves them."""
+    return tuple(Family(branch, within) for branch in search(model, within).branches if len(branch) > 1)
 
-    Those of the last few chutes are remembered: one asks for other flows of the same chute next.
 
-    Raises:
-        SolveError: where the finest grid does not resolve one up to the hold-up ``resolved_to``, or one could not be
-            entered, or too many would have to be traced.
-    """
-    whole: list[Family] = []
-    torn: list[TracedFamily] = []
-    for scene, chain in chains(model, within):
-        knots = scene.knots(chain)
-        if chain.torn:
-            _add_solved(knots, within, torn, whole=False)
-            lost = float(np.exp(min((family.lost for family in torn), default=np.inf)))
-            if lost < resolved_to:
-                raise SolveError(
-                    f"a family of deep flows is too sharp for the finest grid beyond a hold-up of {lost:.4g}: "
-                    "ask for a smaller one"
-                )
+def search(model: Model, within: Range) -> TrajectoryGrid:
+    """The grid of trajectories over the range."""
+    return carry_down(model, within.coldest, within.hottest, within.deepest)
+
+
+def crossings(
+    family: Family, which: int, value: float, tolerance: float = TOLERANCE
+) -> tuple[list[Solution], list[Array]]:
+    """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
+    that were seen and could not be solved."""
+    target = float(np.log(value))
+    m = family.macroscopic
+    off = m[:, which] - target
+    bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
+    spacing = np.diff(family.arclength, prepend=0.0)
+    rough = NEAR + _PER_SPACING * np.maximum(spacing, np.append(spacing[1:], 0.0))
+    near = np.abs(off) < rough + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
+    near[changes] = near[changes + 1] = True
+    found: list[Solution] = []
+    lost: list[Array] = []
+    for begin, end in _runs(near, family.arclength):
+        single = _single(family, which, target, off, begin, end, tolerance)
+        if single is not None:
+            found.append(single)
+            continue
+        try:
+            found += _among(family, which, target, begin, end, tolerance)
+        except SolveError:
+            lost += [m[i] for i in changes.tolist() if begin <= i < end]
+    return found, lost
+
+
+def _is_behind(point: Point, last: Point) -> bool:
+    """Whether a point is the last one, or so close that the roughness of the search put it behind."""
+    step = point.m - last.m
+    length = float(np.linalg.norm(step))
+    return length < _SAME or (length < 0.5 * _TOO_NEAR and float(step @ last.tangent) < 0.5 * length)
+
+
+def _runs(marked: Array, arclength: Array) -> list[tuple[int, int]]:
+    """First and last places of the runs of marked ones, each with neighbours to either side."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
+    runs: list[tuple[int, int]] = []
+    for first, last in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        begin = max(int(np.searchsorted(arclength, arclength[first] - _TOO_NEAR, side="right")) - 1, 0)
+        end = min(int(np.searchsorted(arclength, arclength[last] + _TOO_NEAR, side="left")), len(marked) - 1)
+        if runs and begin <= runs[-1][1]:
+            runs[-1] = (runs[-1][0], end)
         else:
-            whole.append(Family(tuple(knots), False))
-    return (*whole, *(Family(tuple(map(Knot.at, t.solutions)), True) for t in torn))
+            runs.append((begin, end))
+    return runs
 
 
-def traced_families(model: Model, within: Range) -> list[TracedFamily]:
-    """Every family of flows in the range, solved from end to end."""
-    found: list[TracedFamily] = []
-    for scene, chain in chains(model, within):
-        _add_solved(scene.knots(chain), within, found, whole=not chain.torn)
+def _single(
+    family: Family, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
+) -> Solution | None:
+    """The one flow among rough flows along which the quantity rises or falls steeply; None where it may turn."""
+    steps, lengths = np.diff(off[begin : end + 1]), np.diff(family.arclength[begin : end + 1])
+    steep = np.abs(steps) > _STEEP * lengths
+    if not steep.all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        return None
+    change = np.flatnonzero((off[begin:end] >= 0.0) != (off[begin + 1 : end + 1] >= 0.0))
+    if len(change) != 1:
+        return None
+    i = begin + int(change[0])
+    nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
+    weights = np.zeros(4)
+    weights[which] = 1.0
+    point = point_at(family.rough.start(nearer), weights, target, tolerance)
+    if point is None or abs(point.tangent[which]) < 0.5 * _STEEP:
+        return None
+    fraction = off[i] / (off[i] - off[i + 1])
+    there = family.macroscopic[i] + fraction * (family.macroscopic[i + 1] - family.macroscopic[i])
+    spacing = family.arclength[i + 1] - family.arclength[i]
+    return point.solution if np.linalg.norm(point.m - there) < _ROUGH + _ASTRAY * spacing else None
+
+
+def _among(family: Family, which: int, target: float, begin: int, end: int, tolerance: float) -> list[Solution]:
+    """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
+    pieces."""
+    points = family.points(begin, end, tolerance)
+    placed = [(float(i), point) for i, point in enumerate(points)]
+    turning = turns(points, which, tolerance)
+    placed += [(turn.place, turn.point) for turn in turning]
+    placed.sort(key=lambda pair: pair[0])
+    found = []
+    for (_, one), (_, other) in pairwise(placed):
+        ends = float(one.m[which]) - target, float(other.m[which]) - target
+        if (ends[0] >= 0.0) != (ends[1] >= 0.0):
+            _, point = find_value(Chord(one, other, tolerance), which, target)
+            found.append(_polished(point, which, target, tolerance))
+    for turn in turning:
+        # A fold that is at the value to its error is one flow, unless two were found beside it.
+        near = turn.point.solution
+        close = abs(float(turn.point.m[which]) - target) <= near.error
+        reach = 2.0 * float(np.sqrt(near.error))
+        if close and not any(np.linalg.norm(s.macroscopic - near.macroscopic) < reach for s in found):
+            found.append(_at_fold(near))
     return found
 
 
-def _add_solved(knots: list[Knot], within: Range, found: list[TracedFamily], *, whole: bool) -> None:
-    """Add the family of the rough flows ``knots`` to ``found``, unless it is there already: solved side by side where
-    they are the ``whole`` of it, else followed from one of them."""
-    if len(found) == MOST_TRACED:
-        raise SolveError(
-            f"this chute has more than {MOST_TRACED} families of deep flows up to a hold-up of {within.deepest:g}: "
-            "search to a smaller one"
-        )
-    together = solved_together(knots, within) if whole else None
-    if together is not None:
-        if not any(family.holds(together.solutions[len(together.solutions) // 2]) for family in found):
-            found.append(together)
-        return
-    for i in _from_middle(len(knots)):
-        solution, ahead = solved(knots, i)
-        if solution.converged:
-            if not any(family.holds(solution) for family in found):
-                family = traced(solution, ahead, within)
-                # Of a family that only touches the range there is one flow, at its edge.
-                if len(family.solutions) > 1:
-                    found.append(family)
-            return
-    # Of a family that is known, a piece torn off may be too rough to lead back to it.
-    if not any(family.passes(knots) for family in found):
-        raise SolveError("a family seen in the search could not be entered: narrow the range searched")
+def _at_fold(near: Solution) -> Solution:
+    """A flow at a fold in the quantity asked for: there the others are known to the root of the error."""
+    return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 
-def _from_middle(count: int) -> list[int]:
-    return sorted(range(count), key=lambda i: abs(i - count // 2))
+def _polished(point: Point, which: int, target: float, tolerance: float) -> Solution:
+    """The flow at a point whose quantity is that asked for to rounding; its error is what that may do to the others."""
+    tangent = abs(float(point.tangent[which]))
+    near = point.solution
+    if tangent > 1e-3:
+        solution = resolve(near, Condition.fix(which, float(np.exp(target))), tolerance)
+        if solution.converged and np.linalg.norm(solution.macroscopic - near.macroscopic) < 1e-5:
+            return solution
+    error = near.error / max(tangent, float(np.sqrt(near.error)))
+    return Solution(near.macroscopic, error, near.status, near.source, near.rates)
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
-    """Rough flows in order along a family: ``column`` and ``row`` (fractional) on the grid of trajectories,
-    and ``macroscopic`` (k, 4), ln Q, ln h, ln M, ln T_surface. ``torn`` tells whether an end was cut."""
+class TracedFamily:
+    """A branch as far as it goes within a range: solved ``points`` in order, which suffice to know it between them.
 
-    column: Array
-    row: Array
-    macroscopic: Array
-    torn: bool
-
-    def __len__(self) -> int:
-        return len(self.column)
-
-
-@dataclass(frozen=True, eq=False)
-class Landscape:
-    """A grid of trajectories with the integrals of the flows that would end at each point of it.
-
-    ``excess`` (K, C) is B; ``macroscopic`` (K, C, 4) would hold if the base were there.
+    ``ends`` says in words why it ends at either side; a loop ends with its first flow.
     """
 
-    trajectories: Trajectories
-    excess: Array
-    macroscopic: Array
+    points: tuple[Point, ...]
+    ends: tuple[str, str]
 
     @property
-    def model(self) -> Model:
-        """The problem whose trajectories these are."""
-        return self.trajectories.model
+    def solutions(self) -> tuple[Solution, ...]:
+        """The flows of the points."""
+        return tuple(point.solution for point in self.points)
 
-    def knots(self, chain: Chain) -> list[Knot]:
-        """The rough flows of a chain."""
-        return [
-            Knot(m, partial(self.start, float(c), float(r), float(m[LOG_M])))
-            for c, r, m in zip(chain.column, chain.row, chain.macroscopic, strict=True)
-        ]
+    @cached_property
+    def macroscopic(self) -> Array:
+        """ln Q, ln h, ln M, ln T_surface of the flows, (k, 4)."""
+        return np.array([point.m for point in self.points])
 
-    def start(self, column: float, row: float, log_mass: float, degree: int) -> tuple[Collocation, Array]:
-        """A starting point for the solver: the nearest trajectory, ended at ``log_mass``."""
-        t, model = self.trajectories, self.model
-        c = round(column)
-        stop = int(min(t.last[c], np.ceil(row) + 1)) + 1
-        p, big_l, y = t.p[:stop, c], t.big_l[:stop, c], t.y[:stop, c]
-        fine = np.isfinite(y)
-        p, big_l, y = p[fine], big_l[fine], y[fine]
-        mass = float(np.exp(log_mass))
-        problem = Collocation(model, degree, default_stretch(model, mass, float(t.temperature[c])))
-        at = model.surface_stress + mass * problem.share[0]
-        tau, knots = t.tau(np.maximum(at, p[0])), t.tau(p)
-        log_x = np.interp(tau, knots, big_l) + np.minimum(np.log(np.maximum(at, 1e-300) / p[0]), 0.0)
-        flux = np.interp(tau, knots, y / p) * at
-        f, _ = model.closures(np.exp(log_x))
-        potential = surface_potential(model, t.temperature[c : c + 1])[0]
-        return problem, np.concatenate([mass * flux / f[CONDUCTION], [potential, log_mass]])
+    @cached_property
+    def arclength(self) -> Array:
+        """In the space of the macroscopic quantities from the first flow, by chords, (k,)."""
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
 
+    def turns(self, which: int, tolerance: float) -> list[Turn]:
+        """The points at which a quantity turns."""
+        return turns(self.points, which, tolerance)
 
-@lru_cache(maxsize=_REMEMBERED)
-def chains(model: Model, within: Range) -> tuple[tuple[Landscape, Chain], ...]:
-    """The zero set of the excess in a range as chains of rough flows, longest first, each with its landscape.
+    def at(self, places: Array, tolerance: float) -> list[Point]:
+        """Points at ``places`` of the arclength, each solved to ``tolerance``.
 
-    A family may live between two columns alone that are torn apart. Zeros of the excess tell where they are, and so do
-    neighbouring trajectories that end in different ways: deep families lie close to the one that divides them. Such a
-    gap gets a landscape of its own, of which the lines within it are new; those that reach its sides are known.
-    """
-    scene = landscape(model, temperatures(within.coldest, within.hottest), within.deepest)
-    lines = _lines(scene)
-    found = [(scene, chain) for line in lines for chain in _cut(scene, line)]
-    torn = {int(column) for line in lines for column in line[_torn(scene, line), 0]}
-    t = scene.trajectories
-    for part in _within_gaps(t, sorted(torn | _dividing(t)), within.deepest):
-        sides = 0, len(part.trajectories.temperature) - 1
-        for line in _lines(part):
-            if sides[0] < line[:, 0].min() and line[:, 0].max() < sides[1]:
-                found += [(part, chain) for chain in _cut(part, line)]
-    return tuple(sorted(found, key=lambda pair: len(pair[1]), reverse=True))
+        Raises:
+            SolveError: where one could not be solved.
+        """
+        index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
+        out = []
+        for i, place in zip(index.tolist(), places.tolist(), strict=True):
+            chord = Chord(self.points[i], self.points[i + 1], tolerance)
+            point = chord.at((place - float(self.arclength[i])) / chord.length)
+            if point is None:
+                raise SolveError("a flow of a branch could not be solved: ask for a larger tolerance")
+            out.append(point if point.tangent @ chord.direction > 0.0 else point.reversed())
+        return out
 
 
-def _within_gaps(t: Trajectories, gaps: Sequence[int], mass: float) -> list[Landscape]:
-    """The landscape of each gap after a column, with more columns beside trajectories that divide."""
-    parts = _integrated(t.model, [_spread(t.temperature, gap) for gap in gaps], mass)
-    for _ in range(1, _PARTINGS):
-        dividing = [sorted(_dividing(part)) for part in parts]
-        wanted = [
-            np.concatenate([_spread(part.temperature, i)[1:-1] for i in inside]) if inside else np.zeros(0)
-            for part, inside in zip(parts, dividing, strict=True)
-        ]
-        finer = _integrated(t.model, wanted, mass)
-        if not finer:
-            break
-        parts = [part.joined(more) if len(more.temperature) else part for part, more in zip(parts, finer, strict=True)]
-    return [_landscape(part) for part in parts]
-
-
-def _integrated(model: Model, wanted: Sequence[Array], mass: float) -> list[Trajectories]:
-    """Trajectories at each set of surface temperatures, integrated side by side at little more than the cost of one."""
-    if not sum(map(len, wanted)):
-        return []
-    every = integrate(model, np.concatenate(wanted), mass)
-    ends = np.cumsum([len(part) for part in wanted]).tolist()
-    return [every.columns(slice(end - len(part), end)) for part, end in zip(wanted, ends, strict=True)]
-
-
-def _spread(temperature: Array, gap: int) -> Array:
-    """Columns across a gap, its sides among them."""
-    return np.geomspace(temperature[gap], temperature[gap + 1], _COLUMNS_IN_GAP + 2)
-
-
-def _dividing(t: Trajectories) -> set[int]:
-    """The gaps between neighbouring trajectories that end in different ways (cold, hot, or at the largest hold-up)
-    and are torn apart."""
-    columns = np.arange(len(t.temperature))
-    cold = np.isneginf(t.y[t.last, columns])
-    hot = ~cold & (t.big_l[t.last, columns] < LOG_EMPTY)
-    differ = (cold[1:] != cold[:-1]) | (hot[1:] != hot[:-1])
-    row = np.minimum(t.last[1:], t.last[:-1])
-    apart = np.abs(t.big_l[row, columns[1:]] - t.big_l[row, columns[:-1]]) > TORN * np.diff(np.log(t.temperature))
-    return set(np.flatnonzero(differ & (apart | cold[1:] | cold[:-1])).tolist())
-
-
-def landscape(model: Model, temperature: Array, mass: float) -> Landscape:
-    """The landscape of ``model`` over surface temperatures (C,) ascending and hold-ups up to ``mass``."""
-    return _landscape(integrate(model, temperature, mass))
-
-
-def _landscape(t: Trajectories) -> Landscape:
-    base, *fields = scan_table(t.model).at(t.big_l)
-    return Landscape(t, t.y - base, _integrals(t, *fields))
-
-
-def temperatures(low: float, high: float) -> Array:
-    """Columns from ``low`` to ``high``, evenly in the logarithm."""
-    decades = np.log10(high / low)
-    return np.geomspace(low, high, max(FEWEST_COLUMNS, int(np.ceil(COLUMNS_PER_DECADE * decades)) + 1))
-
-
-def _integrals(t: Trajectories, work: Array, density: Array, gamma: Array, slip: Array) -> Array:
-    """ln Q, ln h, ln M, ln T_surface on the grid."""
-    model = t.model
-    over = t.p - model.surface_stress
-    root_t = np.sqrt(t.p * np.exp(gamma - t.big_l))
-    pace = t.p / (1.0 + t.p / t.p1)  # dp/dtau
-    lever = over * np.exp(-t.big_l - density)
-    shear = over * work * model.slope * root_t
-    # Close to the surface T is uniform, and nu uniform at an interface or proportional to p on the half-line.
-    heights = lever * over * (0.5 if model.surface_stress else 1.0)
-    glide = 0.5 * shear * over
-    below = t.thin
-    heights[below:] = heights[below] + _running((lever * pace)[below:])
-    glide[below:] = glide[below] + _running((shear * pace)[below:])
-    tiny = np.finfo(float).tiny
-    flux = np.maximum(slip * root_t * over + glide, tiny)
-    log_m = np.log(over)
-    log_t = np.broadcast_to(np.log(t.temperature), over.shape)
-    return np.stack([np.log(flux), np.log(np.maximum(heights, tiny)) - log_m, log_m, log_t], axis=-1)
-
-
-def _running(rate: Array) -> Array:
-    """Integrals over tau from the first row: of cubics through four rows, at the ends of lines."""
-    steps = 0.5 * (rate[1:] + rate[:-1])
-    steps[1:-1] += (rate[1:-2] + rate[2:-1] - rate[:-3] - rate[3:]) / 24.0
-    total = np.zeros_like(rate)
-    np.cumsum(STEP * steps, axis=0, out=total[1:])
-    return total
-
-
-def _lines(scene: Landscape) -> list[Array]:
-    """The zero set of the excess, each line (k, 2) of columns and rows."""
-    size = float(np.abs(scan_table(scene.model).fields[0]).max()) + 1e-3
-    excess = np.maximum(scene.excess, -1e6 * size)
-    last = np.array(excess.shape[::-1]) - 1.0
-    lines = contour_generator(z=excess / (size + np.abs(excess))).lines(0.0)
-    return [np.minimum(np.asarray(line), last) for line in lines]
-
-
-def _torn(scene: Landscape, line: Array) -> NDArray[np.bool_]:
-    """Where a line runs between trajectories that are torn apart."""
-    t = scene.trajectories
-    left, row = np.floor(line[:, 0]).astype(np.intp), np.floor(line[:, 1]).astype(np.intp)
-    right = np.ceil(line[:, 0]).astype(np.intp)
-    spacing = TORN * np.log(t.temperature[right] / t.temperature[left])
-    apart = np.abs(t.big_l[row, left] - t.big_l[row, right]) > spacing
-    cold = np.isfinite(t.y[row, left]) != np.isfinite(t.y[row, right])
-    return (left != right) & (apart | cold)
-
-
-def _cut(scene: Landscape, line: Array) -> list[Chain]:
-    """Split a line where it runs between trajectories that are torn apart, or beyond their end."""
-    t = scene.trajectories
-    column, row = line.T
-    last = np.minimum(t.last[np.floor(column).astype(np.intp)], t.last[np.ceil(column).astype(np.intp)])
-    good = ~_torn(scene, line) & (row <= last)
-    if not good.all() and np.all(line[0] == line[-1]):
-        # A loop is opened where it is cut.
-        shift = int(np.argmin(good))
-        order = np.roll(np.arange(len(line) - 1), -shift)
-        column, row, good = column[order], row[order], good[order]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
-    out = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        part = slice(first, last)
-        out.append(
-            Chain(
-                column[part],
-                row[part],
-                _at(scene, column[part], row[part]),
-                bool(first > 0 or last < len(good)),
-            )
-        )
-    return out
-
-
-def _at(scene: Landscape, column: Array, row: Array) -> Array:
-    """Macroscopic quantities at fractional grid positions, linear along the one fractional direction."""
-    m = scene.macroscopic
-    left, upper = np.floor(column).astype(int), np.floor(row).astype(int)
-    right, lower = np.ceil(column).astype(int), np.ceil(row).astype(int)
-    share_c, share_r = (column - left)[:, None], (row - upper)[:, None]
-    across = (1.0 - share_c) * m[upper, left] + share_c * m[upper, right]
-    return across + share_r * (m[lower, left] - m[upper, left])
+def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
+    """Every branch of flows in the range, solved from end to end."""
+    return [piece for family in families(model, within) for piece in family.traced(tolerance)]

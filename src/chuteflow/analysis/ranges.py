@@ -16,6 +16,8 @@ SURFACE_TEMPERATURE = (1e-3, 1e5)
 LARGEST_HOLDUP = 30.0
 #: What can be searched at all.
 WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
+#: Why a branch ends for good, in words.
+VANISHES, CLOSED = "its hold-up vanishes", "the branch closes on itself"
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
 
@@ -75,20 +77,31 @@ class Range:
         upper = self.hottest if axis == LOG_T else self.deepest
         return int(macroscopic[axis] > np.log(upper) - _NEAR)
 
-    def passed(self, macroscopic: Array) -> tuple[int, float, str]:
-        """Which edge a flow outside has passed: LOG_T or LOG_M, its value there, and in words."""
-        if macroscopic[LOG_M] > np.log(self.deepest):
-            return LOG_M, float(np.log(self.deepest)), f"it goes on to hold-ups above {self.deepest:g}"
-        if self.shallowest > 0.0 and macroscopic[LOG_M] < np.log(self.shallowest):
-            return LOG_M, float(np.log(self.shallowest)), "its hold-up vanishes"
-        if macroscopic[LOG_T] > np.log(self.hottest):
-            return (
-                LOG_T,
-                float(np.log(self.hottest)),
-                f"it goes on to surface temperatures above {self.hottest:g}",
-            )
-        return (
-            LOG_T,
-            float(np.log(self.coldest)),
-            f"it goes on to surface temperatures below {self.coldest:g}",
-        )
+    def at_edge(self, macroscopic: Array, near: float) -> tuple[int, float] | None:
+        """The edge at which a flow lies to within ``near``: LOG_T or LOG_M, and its value there."""
+        edges = [(LOG_M, self.deepest), (LOG_T, self.hottest), (LOG_T, self.coldest)]
+        if self.shallowest > 0.0:
+            edges.append((LOG_M, self.shallowest))
+        for axis, value in edges:
+            if abs(float(macroscopic[axis]) - np.log(value)) < near:
+                return axis, float(np.log(value))
+        return None
+
+    def end_words(self, macroscopic: Array) -> str:
+        """Why a branch ends at a flow."""
+        edge = self.at_edge(macroscopic, _NEAR)
+        if edge is None:
+            return "the search was not carried further"
+        axis, value = edge
+        if axis == LOG_M:
+            if value == np.log(self.deepest):
+                return f"it goes on to hold-ups above {self.deepest:g}"
+            return VANISHES
+        if value == np.log(self.hottest):
+            return f"it goes on to surface temperatures above {self.hottest:g}"
+        return f"it goes on to surface temperatures below {self.coldest:g}"
+
+
+def goes_on(words: str) -> bool:
+    """Whether a branch that ends with these words may have more flows beyond: it leaves the range, or is lost."""
+    return words not in (VANISHES, CLOSED)

@@ -29,7 +29,8 @@ class FlowSet(Sequence[Flow]):
     """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
-    ``reason`` is one sentence on why there is none, or None where there are flows.
+    ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where a branch
+    leaves the range searched towards what was asked for, so that there may be more, and None where none does.
     """
 
     chute: Chute
@@ -37,6 +38,7 @@ class FlowSet(Sequence[Flow]):
     searched: Searched
     tolerance: float
     reason: str | None
+    incomplete: str | None = None
 
     def __repr__(self) -> str:
         warmth = display.listed([flow.surface_temperature for flow in self.flows])

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.tabulate import Array
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+from chuteflow.trajectories.surface import surface_potential
 
 #: Step in tau, and the largest step in p over the shortest length of the equations.
 STEP, LENGTHS_PER_STEP = 0.25, 0.6
@@ -251,18 +252,3 @@ def _series(model: Model, temperature: Array, p: Array) -> tuple[Array, Array, A
     v = p**2 * half / f[CONDUCTION]
     y = p * (half + (net - 2.0 * half) / 3.0 - half * (v + f[COUPLING] * (1.0 - v)) / 6.0)
     return p, np.log(x), y
-
-
-def surface_potential(model: Model, temperature: Array) -> Array:
-    """theta at the surface for the surface temperatures (C,), by Newton's method at the interface."""
-    theta = np.log(temperature)
-    if model.surface_stress == 0.0:
-        return theta
-    target = theta
-    for _ in range(50):
-        f, df = model.closures(model.surface_stress * np.exp(-theta))
-        step = (target - theta - f[GAMMA]) / (1.0 - df[GAMMA])
-        theta = theta + step
-        if np.abs(step).max() < 1e-12:
-            break
-    return theta

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
+from chuteflow.analysis.counting import Count, flux_counts
 from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
@@ -36,6 +37,7 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
         "flows": [flow_object(flow, scales) for flow in flow_set],
         "searched": searched_object(flow_set.chute, flow_set.searched, scales),
         "reason": flow_set.reason,
+        "incomplete": flow_set.incomplete,
         **_units(scales, NUMBERS),
     }
 
@@ -54,6 +56,7 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
     return {
         "chute": chute_object(curve.chute),
         "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
+        "counts": [_count(curve.chute, count, scales) for count in flux_counts(curve)],
         "searched": searched_object(curve.chute, curve.searched, scales),
         "reason": curve.reason,
         **_units(scales, PLACE),
@@ -141,6 +144,16 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
     validity: dict[str, Any] = {name: [finite(getattr(one, name)) for one in known] for name in VALIDITY}
     validity["words"] = [list(one.words) for one in known]
     return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
+
+
+def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:
+    flux = factor("mass_flux", chute, scales)
+    return {
+        "Q_from": count.low * flux,
+        "Q_to": finite(count.high * flux),
+        "flows": count.flows,
+        "at_least": count.at_least,
+    }
 
 
 def searched_object(chute: Chute, searched: Searched, scales: Scales | None = None) -> dict[str, Any]:

@@ -84,6 +84,8 @@ def head(result: Result, found: Sequence[Row]) -> dict[str, Any]:
             "tolerance": result.tolerance,
             "reason": result.reason,
         }
+    if isinstance(result, FlowSet):
+        kept["incomplete"] = result.incomplete
     if isinstance(result, Curve):
         kept["ends"] = [list(branch.ends) for branch in result.branches]
     return kept | {CHECKSUM: checksum(kept, map(unknowns, found))}
@@ -172,7 +174,7 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     status = Status[kept["status"]]
     logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
     error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
-    solution = Solution(Collocation(model(chute), degree, stretch), z, np.array(logarithms), error, status)
+    solution = Solution(np.array(logarithms), error, status, (Collocation(model(chute), degree, stretch), z))
     if solution.converged:
         with np.errstate(all="ignore"):
             distance = np.abs(solution.problem.state(z).macroscopic() - solution.macroscopic).max()
@@ -219,7 +221,10 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
         for one, two in pairwise(flows):
             if one.surface_temperature < two.surface_temperature or _same(one, two):
                 raise InputError("its flows are not from hot to cold, each once")
-        return FlowSet(chute, flows, searched, tolerance, reason)
+        incomplete = kept.get("incomplete")
+        if not (incomplete is None or isinstance(incomplete, str)):
+            raise InputError(f"incomplete = {shown(incomplete)}: must be a sentence or null")
+        return FlowSet(chute, flows, searched, tolerance, reason, incomplete)
     if kind != "curve":
         raise InputError(f"it holds an unknown kind of result, {shown(kind)}")
     ends = [(str(begin), str(end)) for begin, end in kept["ends"]]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 
+from chuteflow.analysis.counting import Count, flux_counts
 from chuteflow.analysis.results import Curve, Searched
 from chuteflow.faces.contract import factor
 from chuteflow.faces.tables import number
@@ -86,24 +88,24 @@ def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
 
 def multiplicity(curve: Curve, scales: Scales | None) -> str:
     """How many flows share one mass flux, from folds and ends of the branches."""
-    stretches: list[tuple[float, float]] = []
-    for branch in curve.branches:
-        turns = [point.flow.mass_flux for point in branch.special if point.kind == "fold-Q"]
-        stops = [branch.flows[0].mass_flux, *turns, branch.flows[-1].mass_flux]
-        stretches += [(min(pair), max(pair)) for pair in pairwise(stops)]
-    edges = sorted({edge for stretch in stretches for edge in stretch})
-    counted: list[tuple[int, float, float]] = []
-    for low, high in pairwise(edges):
-        count = sum(first <= low and high <= last for first, last in stretches)
-        if counted and counted[-1][0] == count:
-            counted[-1] = (count, counted[-1][1], high)
-        else:
-            counted.append((count, low, high))
-    flux = factor("mass_flux", curve.chute, scales)
-    said = [
-        f"{count} for Q from {number(low * flux)} to {number(high * flux)}" for count, low, high in counted if count
-    ]
-    return f"flows that share one mass flux: {', '.join(said)}{_unit('mass_flux', scales)}"
+    flux, unit = factor("mass_flux", curve.chute, scales), _unit("mass_flux", scales)
+    counts = flux_counts(curve)
+    known = [f"{'at least ' if c.at_least else ''}{c.flows} for {_fluxes(c, flux)}" for c in counts if c.flows]
+    unknown = [_fluxes(c, flux) for c in counts if c.at_least and not c.flows]
+    said = f"flows that share one mass flux: {', '.join(known)}{unit}"
+    if unknown:
+        said += f"; not known for {' and '.join(unknown)}{unit}"
+    if any(c.at_least for c in counts):
+        said += ", where branches leave the range searched"
+    return said
+
+
+def _fluxes(count: Count, factor: float) -> str:
+    """The mass fluxes of a count."""
+    low, high = number(count.low * factor), number(count.high * factor)
+    if count.low == 0.0:
+        return f"Q below {high}"
+    return f"Q above {low}" if count.high == math.inf else f"Q from {low} to {high}"
 
 
 def _unit(name: str, scales: Scales | None) -> str:

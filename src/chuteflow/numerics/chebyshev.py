@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -33,6 +34,55 @@ class Grid:
     def degree(self) -> int:
         """Degree n of the interpolant."""
         return len(self.nodes) - 1
+
+
+@dataclass(frozen=True)
+class PiecewiseGrid:
+    """The grid of one degree d on each of the pieces between ``breaks`` (N+1,), from 0 to 1; pieces share their ends.
+
+    ``nodes`` (N d + 1,); ``derivative``, ``integral`` and ``weights`` as in :class:`Grid`, of the piecewise
+    polynomial. At a break the derivative is that of the piece to the left.
+    """
+
+    breaks: Array
+    piece: Grid
+    nodes: Array
+    derivative: Array
+    integral: Array
+    weights: Array
+
+    @property
+    def degree(self) -> int:
+        """Number of nodes less one."""
+        return len(self.nodes) - 1
+
+
+AnyGrid = Grid | PiecewiseGrid
+
+
+@lru_cache(maxsize=8)
+def piecewise_grid(breaks: tuple[float, ...], degree: int) -> PiecewiseGrid:
+    """The grid of ``degree`` on each piece between ``breaks``, which rise from 0 to 1."""
+    piece = grid(degree)
+    b = np.array(breaks)
+    count = len(b) - 1
+    size = count * degree + 1
+    nodes = np.empty(size)
+    derivative, integral, weights = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+    for e, (low, high) in enumerate(pairwise(breaks)):
+        here = slice(e * degree, (e + 1) * degree + 1)
+        width = high - low
+        nodes[here] = low + width * piece.nodes
+        nodes[here.stop - 1] = high
+        rows = slice(here.start + (e > 0), here.stop)
+        derivative[rows, here] = piece.derivative[(e > 0) :] / width
+        # Below this piece all of it counts, in it the integral up to the node.
+        integral[here.stop :, here] += width * piece.weights
+        integral[rows, here] += width * piece.integral[(e > 0) :]
+        weights[here] += width * piece.weights
+    for array in (b, nodes, derivative, integral, weights):
+        array.setflags(write=False)
+    return PiecewiseGrid(b, piece, nodes, derivative, integral, weights)
 
 
 @lru_cache(maxsize=64)
@@ -85,8 +135,16 @@ def _integrals_of_basis(angle: Array) -> Array:
     return out
 
 
-def interpolation_matrix(g: Grid, points: Array) -> Array:
+def interpolation_matrix(g: AnyGrid, points: Array) -> Array:
     """Matrix (m, n+1) that takes values at the nodes to values at ``points`` (m,) in [0, 1]."""
+    if isinstance(g, PiecewiseGrid):
+        degree = g.piece.degree
+        piece = np.clip(np.searchsorted(g.breaks, points, side="left") - 1, 0, len(g.breaks) - 2)
+        local = (points - g.breaks[piece]) / np.diff(g.breaks)[piece]
+        matrix = np.zeros((len(points), len(g.nodes)))
+        columns = piece[:, None] * degree + np.arange(degree + 1)
+        np.put_along_axis(matrix, columns, interpolation_matrix(g.piece, local), axis=1)
+        return matrix
     gap = points[:, None] - g.nodes
     hit = gap == 0.0
     gap[hit] = 1.0
@@ -104,8 +162,11 @@ def refinement(coarse: int, fine: int) -> Array:
     return matrix
 
 
-def tail(g: Grid, values: Array) -> float:
+def tail(g: AnyGrid, values: Array) -> float:
     """Relative size of the last coefficients of ``values`` (..., n+1): how far the series has decayed."""
+    if isinstance(g, PiecewiseGrid):
+        columns = np.arange(len(g.breaks) - 1)[:, None] * g.piece.degree + np.arange(g.piece.degree + 1)
+        return tail(g.piece, values[..., columns])
     coefficients = np.abs(values @ g.to_coefficients.T)
     last = max(2, g.degree // 8)
     return float(coefficients[..., -last:].max() / (coefficients.max() + 1e-300))

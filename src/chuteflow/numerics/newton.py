@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -61,3 +62,16 @@ def newton(
                 return NewtonResult(z, False, iteration, step_size)
             z, f, jacobian, size = trial, f_trial, jacobian_trial, size_trial
         return NewtonResult(z, False, max_iterations, step_size)
+
+
+def solve_each(matrices: Array, sides: Array) -> Array:
+    """Solve A X = B for matrices (..., n, n) and sides (..., n, m), or for one matrix and one side (n,).
+
+    A member whose matrix is singular gets NaN: with :func:`numpy.linalg.solve` it would end all.
+    """
+    try:
+        return cast(Array, np.linalg.solve(matrices, sides))
+    except np.linalg.LinAlgError:
+        if matrices.ndim == 2:
+            return np.full(sides.shape, np.nan)
+        return np.stack([solve_each(matrix, side) for matrix, side in zip(matrices, sides, strict=True)])

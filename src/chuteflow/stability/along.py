@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow import display
-from chuteflow.analysis.crossings import Chord
+from chuteflow.analysis.paths import solve_between
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
@@ -119,7 +119,7 @@ def flow_between(flows: Sequence[Flow], position: float) -> Flow:
     share = position - i
     if share in (0.0, 1.0):
         return last if share else first
-    return Flow(first.chute, Chord(first.solution, last.solution).at(share))
+    return Flow(first.chute, solve_between(first.solution, last.solution, share))
 
 
 def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> MarkedBranch:

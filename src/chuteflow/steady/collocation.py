@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from chuteflow.numerics.chebyshev import Array, Grid, grid, interpolation_matrix, refinement
+from chuteflow.numerics.chebyshev import AnyGrid, Array, grid, interpolation_matrix, piecewise_grid, refinement
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 
 #: The order of the macroscopic quantities: ln Q, ln h, ln M, ln T_surface.
@@ -43,7 +43,8 @@ def stretch_position(m: Array, stretch: Array | float) -> Array:
 class Collocation:
     """The problem of ``model`` on the grid of one ``degree`` n, with one ``stretch``.
 
-    Unknowns z (n+3,) = (g at the nodes, theta at the surface, ln M); residuals (n+2,): the surface condition,
+    A flow too winding for one grid has one of this degree on each piece between ``breaks``; n is the number of nodes
+    less one. Unknowns z (n+3,) = (g at the nodes, theta at the surface, ln M); residuals (n+2,): the surface condition,
     the energy balance at the other nodes, and the base condition. Many flows are treated at once with
     unknowns (k, n+3) and, where their stretches differ, a ``stretch`` of the shape (k, 1).
     """
@@ -51,11 +52,12 @@ class Collocation:
     model: Model
     degree: int
     stretch: Array | float
+    breaks: tuple[float, ...] = (0.0, 1.0)
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> AnyGrid:
         """The grid in s."""
-        return grid(self.degree)
+        return grid(self.degree) if len(self.breaks) == 2 else piecewise_grid(self.breaks, self.degree)
 
     @cached_property
     def share(self) -> tuple[Array, Array]:
@@ -73,9 +75,10 @@ class Collocation:
 
     def transferred(self, degree: int, stretch: Array | float | None = None) -> tuple[Collocation, Array]:
         """The problem on another grid, and the matrix that takes g to its nodes."""
-        if stretch is None or stretch is self.stretch or np.array_equal(stretch, self.stretch):
+        same = stretch is None or stretch is self.stretch or np.array_equal(stretch, self.stretch)
+        if same and len(self.breaks) == 2:
             return Collocation(self.model, degree, self.stretch), refinement(self.degree, degree)
-        other = Collocation(self.model, degree, stretch)
+        other = Collocation(self.model, degree, self.stretch if stretch is None else stretch, self.breaks)
         position = stretch_position(other.share[0], self.stretch)
         return other, interpolation_matrix(self.grid, position)
 

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from chuteflow import display
 from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
+from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.names import name_of
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
-from chuteflow.steady.solver import Solution, in_parts
+from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.laws import law
@@ -33,6 +33,8 @@ _LEVEL = 1e-8
 _MOST_POINTS = 1_000_000
 #: Far above the base, what falls off exponentially becomes zero.
 _vanishing = np.errstate(under="ignore")
+#: Samples of an element, its ends among them.
+_PER_ELEMENT = 7
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -421,27 +423,31 @@ class Flow:
 
 
 def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
-    """The flows of many ``solutions`` on ``chute``; what their kinds are told from is computed side by side."""
-    flows = [Flow(chute, solution) for solution in solutions]
-    for degree in {solution.problem.degree for solution in solutions}:
-        for members in in_parts([flow for flow in flows if flow.solution.problem.degree == degree]):
-            stretches = np.array([[flow.solution.problem.stretch] for flow in members])
-            problem = Collocation(members[0].solution.problem.model, degree, stretches)
-            samples = _samples_of(problem.state(np.array([flow.solution.z for flow in members])))
-            for i, flow in enumerate(members):
-                vars(flow)["_samples"] = {name: values[i] for name, values in samples.items()}
-    return flows
+    """The flows of many ``solutions`` on ``chute``."""
+    return [Flow(chute, solution) for solution in solutions]
+
+
+def rough_kinds(solution: Solution) -> tuple[float, float, float]:
+    """Density excess, smallest and largest net loss of a flow as in :class:`Flow`, to about 1e-7: from its elements."""
+    elements = solution.elements
+    model, mass = elements.model, np.exp(elements.log_mass)
+    s = np.unique(elements.breaks[:-1, None] + np.diff(elements.breaks)[:, None] * np.linspace(0.0, 1.0, _PER_ELEMENT))
+    theta, y = elements.at(s).T
+    share, _ = stretch_map(s, elements.stretch)
+    p = mass * share + model.surface_stress
+    f, _ = model.closures(p * np.exp(-theta))
+    net = f[LOSS] - model.slope**2 * f[WORK]
+    return float((p * y / f[CONDUCTION]).max() - 1.0), float(net.min()), float(net.max())
 
 
 @_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem
-    degree = max(_SAMPLES, 2 * problem.degree)
+    fine, matrix = problem.transferred(max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
-    nu, rise, net = nodal @ refinement(problem.degree, degree).T
-    share, _ = stretch_map(grid(degree).nodes, problem.stretch)
-    return {"share": share, "nu": nu, "rise": rise, "net": net}
+    nu, rise, net = nodal @ matrix.T
+    return {"share": fine.share[0], "nu": nu, "rise": rise, "net": net}
 
 
 def _density(x: Array, f: Array) -> Array:

@@ -15,7 +15,7 @@ on p_S <= p <= p_S + M is
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,8 @@ from chuteflow.theory.laws import law
 CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
-_OFFSET = 0.2
-_UPPER, _PIECES, _DEGREE = 4.2, 200, 7
+OFFSET = 0.2
+UPPER, _PIECES, _DEGREE = 4.2, 200, 7
 
 #: The parameters of a chute that are numbers.
 PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
@@ -41,16 +41,16 @@ IMAGINARY_STEP = 1e-20
 
 
 def _coordinate(x: Array) -> Array:
-    return np.log1p(np.log1p(x * (1.0 / _OFFSET)))
+    return np.log1p(np.log1p(x * (1.0 / OFFSET)))
 
 
 def _coordinate_slope(x: Array) -> Array:
     """dc/dln x."""
-    return x / ((x + _OFFSET) * (1.0 + np.log1p(x * (1.0 / _OFFSET))))
+    return x / ((x + OFFSET) * (1.0 + np.log1p(x * (1.0 / OFFSET))))
 
 
 def _argument(c: Array) -> Array:
-    return _OFFSET * np.expm1(np.expm1(c))
+    return OFFSET * np.expm1(np.expm1(c))
 
 
 def closure_table(closure: Law, e: float, slope: float) -> Table:
@@ -74,14 +74,14 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         k = r.coupling * nu / (r.stiffness + r.coupling * nu)
         return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
 
-    return tabulate(functions, 0.0, _UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
 
 
 def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
     """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
-    inner = np.log1p(x * (1.0 / _OFFSET))
+    inner = np.log1p(x * (1.0 / OFFSET))
     values, slopes = table(np.log1p(inner))
-    return values, slopes * (x / ((x + _OFFSET) * (1.0 + inner)))
+    return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
 def _density_table(chosen: Law, e: float, slope: float) -> Table:
@@ -91,9 +91,9 @@ def _density_table(chosen: Law, e: float, slope: float) -> Table:
         scaled = _argument(c)
         room = 1.0 / (1.0 + scaled / chosen.densest)
         rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
-        return rate[:, None] * ((scaled + _OFFSET) * (1.0 + np.log1p(scaled / _OFFSET)))[:, None]
+        return rate[:, None] * ((scaled + OFFSET) * (1.0 + np.log1p(scaled / OFFSET)))[:, None]
 
-    gamma = antiderivative(tabulate(gamma_slope, 0.0, _UPPER, _PIECES, _DEGREE))
+    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE))
 
     def functions(c: Array) -> Array:
         scaled = _argument(c)
@@ -102,13 +102,13 @@ def _density_table(chosen: Law, e: float, slope: float) -> Table:
         log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
         return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
 
-    return tabulate(functions, 0.0, _UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
 
 
 def _invert(density: Table, x: Array) -> Array:
     """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
     log_x = np.log(np.maximum(x, 1e-300))
-    knots = _argument(np.linspace(1e-9, _UPPER, 400))
+    knots = _argument(np.linspace(1e-9, UPPER, 400))
     (log_ratio, _), _ = density(_coordinate(knots))
     log_scaled = np.interp(log_x, np.log(knots) + log_ratio.real, np.log(knots))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
@@ -152,6 +152,28 @@ class Model:
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
         return self.slope * self.slip(closures) - self.base_loss
+
+    @cached_property
+    def flux_scale(self) -> float:
+        """The size of heat fluxes y: the largest of those that the base gives, and at which loss balances
+        conduction."""
+        f, _ = self.closures(np.append(0.0, np.geomspace(1e-3, 1e6, 64)))
+        net = f[LOSS] - self.slope**2 * f[WORK]
+        balance = np.sqrt(2.0 * np.maximum(net, 0.0) * f[CONDUCTION])
+        return max(float(balance.max()), float(np.abs(self.base_flux(f)).max()), 1e-3)
+
+    @cached_property
+    def constants(self) -> Array:
+        """Slope, p_S, y_S, base loss, and the slip coefficient F1 as an affine function of shear and grip, (7,)."""
+        unit = np.zeros((8, 2))
+        unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
+        by_shear, by_grip = self.slip_slope(unit)
+        return np.array(
+            [
+                self.slope, self.surface_stress, self.surface_flux, self.base_loss,
+                self.slip_of_empty_base, by_shear, by_grip,
+            ]
+        )  # fmt: skip
 
 
 def model(chute: Chute) -> Model:

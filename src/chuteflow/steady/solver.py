@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 
 from chuteflow.checks import real
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.numerics.newton import newton
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
+from chuteflow.steady.elements import MOST_ELEMENTS, Elements
 from chuteflow.steady.model import Model
 
-#: Degrees tried in turn; each is solved on, and judged by the next.
-DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
 #: Relative tolerance in Q, h and M unless another is asked for.
 TOLERANCE = 1e-10
-#: Least error ever claimed, and error of the residuals by rounding and tabulation of the closures.
-_FLOOR, _NOISE = 1e-12, 2e-14
-#: Newton's method ends with a step below this, after which the next one would be below rounding.
-_STEP = 1e-7
-#: Iterations of flows side by side before the rest are solved one by one, and the longest step there.
-_MOST_SIDE_BY_SIDE, _FAR = 6, 3.0
-#: Flows that are treated side by side at most.
-_TOGETHER = 256
-
-Item = TypeVar("Item")
+#: Least error ever claimed, and factor by which rounding may do more than in the cases that are tried.
+_FLOOR, _SAFETY = 1e-12, 4.0
+#: Newton's method ends with a step below this, after which the next one would be below rounding; steps at most.
+_STEP, _MOST_STEPS = 1e-7, 40
+#: The hold-up fixes a flow where it is this part of the change along the branch.
+_STEEP = 0.05
+#: A grid resolves a flow where the coefficients of g and y decay to this, and the integrals agree to the second.
+_RESOLVED, _AGREES = 1e-11, 1e-10
 
 
 class Status(Enum):
@@ -64,13 +59,17 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended."""
+    """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended.
 
-    problem: Collocation
-    z: Array
+    ``source`` is the flow on elements, as it was solved, or on a Chebyshev grid with its unknowns. ``rates`` (4,) are
+    the derivatives of the macroscopic quantities along the branch, with the value of the condition that was solved.
+    """
+
     macroscopic: Array
     error: float
     status: Status
+    source: Elements | tuple[Collocation, Array]
+    rates: Array | None = None
 
     @property
     def converged(self) -> bool:
@@ -78,8 +77,27 @@ class Solution:
         return self.status is Status.CONVERGED
 
     @cached_property
+    def elements(self) -> Elements:
+        """The flow on elements."""
+        return self.source if isinstance(self.source, Elements) else Elements.of_collocation(*self.source)
+
+    @cached_property
+    def _on_grid(self) -> tuple[Collocation, Array]:
+        return self.source if isinstance(self.source, tuple) else collocate(self)
+
+    @property
+    def problem(self) -> Collocation:
+        """The problem on a Chebyshev grid that resolves the flow."""
+        return self._on_grid[0]
+
+    @property
+    def z(self) -> Array:
+        """Its unknowns on that grid."""
+        return self._on_grid[1]
+
+    @cached_property
     def state(self) -> State:
-        """Everything pointwise at the nodes."""
+        """Everything pointwise at the nodes of that grid."""
         return self.problem.state(self.z)
 
 
@@ -108,135 +126,35 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
 
 # A flow that runs away is told by what is not finite.
 @np.errstate(all="ignore")
-def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
-    """The flow nearest to ``z`` that meets ``condition``.
+def collocate(solution: Solution) -> tuple[Collocation, Array]:
+    """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.
 
-    Newton's method converges on one grid, and takes one more step on the next finer one: the change in
-    ln Q, ln h and ln M is the error of the coarser solution, and bounds that of the finer, which is
-    returned. The grid is refined until the change is below ``tolerance``, or below what rounding does, which
-    is more very close to a fold.
+    Newton's method on the grid, at the same hold-up, or beside a fold in it across the branch: profiles are then as
+    accurate as the integrals over the depth. Where not even the last grid resolves it, they have the digits of the
+    elements there.
     """
-    weights = np.array(condition.weights)
-    value = np.array(condition.value)
-    finer_degrees = [d for d in DEGREES if d > problem.degree]
-    while True:
-        result = newton(
+    rates = solution.rates
+    weights = np.array([0.0, 0.0, 1.0, 0.0])
+    if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
+        weights = rates / np.linalg.norm(rates)
+    value = np.array(float(weights @ solution.macroscopic))
+    last = None
+    for problem, rough in solution.elements.grids():
+        last = problem, rough
+        found = newton(
             lambda z, problem=problem: _system(problem.state(z), weights, value),
-            z,
+            rough,
             tolerance=_STEP,
             longest_step=2.0,
         )
-        z = result.z
-        if not result.converged:
-            return Solution(problem, z, np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE)
-        coarse = problem.state(z).macroscopic()
-        if not finer_degrees:
-            return Solution(problem, z, coarse, np.inf, Status.UNRESOLVED)
-        problem, z = prolong(problem, z, finer_degrees.pop(0))
-        z, fine, change, noise = _refined(problem, z, weights, value, coarse)
-        error = np.maximum(change, noise)
-        if change < max(tolerance, noise):
-            return Solution(problem, z, fine, float(error), Status.CONVERGED)
-
-
-def in_parts(members: list[Item]) -> Iterator[list[Item]]:
-    """As many members at a time as are treated side by side: more would take memory and no less time."""
-    for first in range(0, len(members), _TOGETHER):
-        yield members[first : first + _TOGETHER]
-
-
-def solve_many(
-    starts: Sequence[tuple[Collocation, Array]], conditions: Sequence[Condition], tolerance: float = TOLERANCE
-) -> list[Solution]:
-    """As :func:`solve` for many flows of one model at once, which costs a fraction for each.
-
-    Flows on grids of one degree go through Newton's method side by side, and those that want a finer grid go
-    on to the next degree; the few that do not converge so are solved one by one.
-    """
-    out: dict[int, Solution] = {}
-    pending = dict(enumerate(starts))
-    for degree, finer in pairwise(DEGREES):
-        members = [i for i, (problem, _) in pending.items() if problem.degree == degree]
-        for some in in_parts(members):
-            pending |= _side_by_side(some, pending, finer, conditions, tolerance, out)
-        pending = {i: start for i, start in pending.items() if i not in out}
-    for i, (problem, z) in pending.items():
-        out[i] = solve(problem, z, conditions[i], tolerance)
-    return [out[i] for i in range(len(starts))]
-
-
-def _side_by_side(
-    members: Sequence[int],
-    starts: Mapping[int, tuple[Collocation, Array]],
-    finer: int,
-    conditions: Sequence[Condition],
-    tolerance: float,
-    out: dict[int, Solution],
-) -> dict[int, tuple[Collocation, Array]]:
-    """Solve the flows ``members`` on their common degree, put those that reach the tolerance on the finer one
-    into ``out``, and return where to go on from with those that were found but want more."""
-    model, degree = starts[members[0]][0].model, starts[members[0]][0].degree
-    together = Collocation(model, degree, np.array([[starts[i][0].stretch] for i in members]))
-    z = np.array([starts[i][1] for i in members])
-    weights = np.array([conditions[i].weights for i in members])
-    value = np.array([conditions[i].value for i in members])
-    step = np.full(len(members), np.inf)
-    # A flow that runs away is left where it is, and solved on its own afterwards.
-    with np.errstate(all="ignore"):
-        for _ in range(_MOST_SIDE_BY_SIDE):
-            f, jacobian = _system(together.state(z), weights, value)
-            move = np.linalg.solve(jacobian, f[..., None])[..., 0]
-            step = np.abs(move).max(axis=-1)
-            z = np.where((step < _FAR)[:, None], z - move, z)
-            if not (step >= _STEP).any():
-                break
-        coarse = together.state(z).macroscopic()
-        together, z = prolong(together, z, finer)
-        z, fine, change, noise = _refined(together, z, weights, value, coarse)
-        error = np.maximum(change, noise)
-    onward: dict[int, tuple[Collocation, Array]] = {}
-    for row, i in enumerate(members):
-        if not step[row] < _STEP:
-            continue
-        problem = Collocation(model, finer, starts[i][0].stretch)
-        if change[row] < max(tolerance, noise[row]):
-            out[i] = Solution(problem, z[row], fine[row], float(error[row]), Status.CONVERGED)
-        elif np.isfinite(z[row]).all():
-            onward[i] = (problem, z[row])
-    return onward
-
-
-def _refined(
-    problem: Collocation, z: Array, weights: Array, value: Array, coarse: Array
-) -> tuple[Array, Array, Array, Array]:
-    """One Newton step on a finer grid: unknowns, macroscopic quantities, their change, and what rounding of
-    the residuals and of the tabulated closures can do to them."""
-    state = problem.state(z)
-    f, jacobian = _system(state, weights, value)
-    z = z - np.linalg.solve(jacobian, f[..., None])[..., 0]
-    fine = problem.state(z).macroscopic()
-    change = np.abs(fine - coarse)[..., :LOG_T].max(axis=-1)
-    gradient = np.swapaxes(state.macroscopic_gradient()[..., :LOG_T, :], -1, -2)
-    adjoint = np.linalg.solve(np.swapaxes(jacobian, -1, -2), gradient)
-    sensitivity = np.abs(adjoint).sum(axis=-2).max(axis=-1)
-    return z, fine, change, np.maximum(_FLOOR, _NOISE * sensitivity)
-
-
-def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
-    """The flow that meets ``condition``, from a neighbour: from one grid coarser, as :func:`solve`."""
-    coarser = max(d for d in DEGREES if d < max(near.problem.degree, DEGREES[1]))
-    return solve(*prolong(near.problem, near.z, coarser), condition, tolerance)
-
-
-def between(one: Solution, other: Solution, share: float) -> tuple[Collocation, Array]:
-    """Where to start from for a flow ``share`` of the way from ``one`` to ``other``, one grid coarser."""
-    coarser = max(d for d in DEGREES if d < max(one.problem.degree, DEGREES[1]))
-    problem, matrix = one.problem.transferred(coarser)
-    degree, stretch = problem.degree, problem.stretch
-    _, other_matrix = other.problem.transferred(degree, stretch)
-    z = np.concatenate([matrix @ one.z[:-2], one.z[-2:]])
-    other_z = np.concatenate([other_matrix @ other.z[:-2], other.z[-2:]])
-    return problem, z + share * (other_z - z)
+        if found.converged:
+            state = problem.state(found.z)
+            decay = tail(problem.grid, np.stack([v / np.abs(v).max() for v in (state.g, state.y)]))
+            off = float(np.abs(state.macroscopic() - solution.macroscopic)[:LOG_T].max())
+            if decay < _RESOLVED and off < max(_AGREES, 10.0 * solution.error):
+                return problem, found.z
+    assert last is not None
+    return last
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
@@ -247,3 +165,49 @@ def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
         np.concatenate([state.residual(), off[..., None]], axis=-1),
         np.concatenate([state.jacobian(), gradient[..., None, :]], axis=-2),
     )
+
+
+def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
+    """The flow nearest to ``start`` that meets ``condition``.
+
+    Newton's method converges on one mesh, and takes one more step on the mesh of twice as many elements: the change
+    in ln Q, ln h and ln M is the error of the coarser solution, and bounds that of the finer, which is returned.
+    The mesh is refined until the change is below ``tolerance``, or below what rounding does, which is more very close
+    to a fold.
+    """
+    weights, value = np.array(condition.weights), condition.value
+    coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)
+    while np.isfinite(coarse.step):
+        fine = coarse.flow.halved().iterated(weights, value, np.inf, 1, rounding=True)
+        if not np.isfinite(fine.step):
+            break
+        change = float(np.abs(fine.quantities - coarse.quantities)[:LOG_T].max())
+        noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors[:, :LOG_T]).max()))
+        if change < max(tolerance, noise):
+            return Solution(fine.quantities, max(change, noise), Status.CONVERGED, fine.flow, fine.rates)
+        if len(fine.flow.slopes) > MOST_ELEMENTS:
+            return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
+        coarse = fine.flow.iterated(weights, value, _STEP, _MOST_STEPS)
+    return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
+
+
+def solve_many(
+    starts: Sequence[Elements], conditions: Sequence[Condition], tolerance: float = TOLERANCE
+) -> list[Solution]:
+    """As :func:`solve`, for many flows."""
+    return [solve(start, condition, tolerance) for start, condition in zip(starts, conditions, strict=True)]
+
+
+def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
+    """The flow that meets ``condition``, from a neighbour."""
+    return solve(near.elements.adapted(_stretch(near)), condition, tolerance)
+
+
+def between(one: Solution, other: Solution, fraction: float) -> Elements:
+    """Where to start from for a flow ``fraction`` of the way from ``one`` to ``other``."""
+    return one.elements.blended(other.elements, fraction, _stretch(one))
+
+
+def _stretch(solution: Solution) -> float:
+    mass, temperature = np.exp(solution.macroscopic[LOG_M:])
+    return default_stretch(solution.elements.model, float(mass), float(temperature))

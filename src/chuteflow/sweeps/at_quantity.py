@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.ranges import DEEPEST, WIDEST
+from chuteflow.analysis.rough_turns import may_turn
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
@@ -42,8 +43,14 @@ _WIDENINGS, _LEADS = 4, 0.25
 _AT_EDGE, _STEEPEST = 0.3, 4.0
 #: Columns reach to hold-ups a little beyond those asked for, so that no flow lies beside the last one.
 _BEYOND = 1.1
-#: Where two flows meet, the value there lies within this many of their distances, and a little.
-_ASIDE, _LITTLE = 1.0, 1e-3
+#: Where two flows meet, the value there lies within this many of their distances, this many steps in ln T beside, and
+#: a little.
+_ASIDE, _AWAY, _LITTLE = 1.0, 1.0, 1e-3
+#: Between columns a quantity departs from its values there by at most this part of what its slope changes over the
+#: step; and what rough columns may be off.
+_SAG, _NOISE = 0.5, 2e-5
+#: In steps of ln T narrower than this rough columns do not tell turns from noise: such lanes are searched one by one.
+_NARROWEST = 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
 #: A flow meets the value asked for to this.
@@ -150,19 +157,20 @@ def at_quantity(
         unsettled[columns.lane[columns.count < 0]] = True
         unsettled[columns.lane[_deeper(problem, columns)]] = True
         columns = columns.of(~unsettled)
-        found, split = _links(problem, columns)
+        found, split, lost = _links(problem, columns)
+        unsettled[columns.lane[lost]] = True
         # A lane is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
         ready[columns.lane[split]] = False
         ready &= ~unsettled
         brackets.append(_chosen(found, ready))
-        columns = columns.of(~ready & ~unsettled)
-        if not columns.lane.size:
+        going = ~ready & ~unsettled
+        if not going[columns.lane].any():
+            columns = columns.of(going)
             break
-        _, split = _links(problem, columns)
-        gap = columns.log_t[split + 1] - columns.log_t[split]
-        middle = columns.log_t[split] + 0.5 * gap
-        columns = columns.joined(problem.columns(columns.lane[split], middle))
+        split = split[going[columns.lane[split]]]
+        middle = 0.5 * (columns.log_t[split] + columns.log_t[split + 1])
+        columns = columns.joined(problem.columns(columns.lane[split], middle)).of(going)
     unsettled[columns.lane] = True
     whole = Brackets(*(np.concatenate(part) for part in zip(*(vars(b).values() for b in brackets), strict=True)))
     flows, failed = _found(problem, whole, tolerance)
@@ -212,15 +220,16 @@ def _chosen(brackets: Brackets, lanes: NDArray[np.bool_]) -> Brackets:
     return Brackets(*(part[keep] for part in vars(brackets).values()))
 
 
-def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
-    """The flows that lie between columns that go over into each other, and the columns after which there is a gap that
-    may hide more, and wants a column."""
+def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indices]:
+    """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
+    hide more, and wants a column, and those after which columns do not tell."""
     left = np.flatnonzero(columns.lane[1:] == columns.lane[:-1])
     right = left + 1
     lane = columns.lane[left]
     a, b = columns.flows[left], columns.flows[right]
     n_a, n_b = columns.count[left], columns.count[right]
-    apart = _APART + _BY_TEMPERATURE * (columns.log_t[right] - columns.log_t[left])
+    step = columns.log_t[right] - columns.log_t[left]
+    apart = _APART + _BY_TEMPERATURE * step
     deepest = problem.deepest[lane]
     # From the surface down the flows go over into each other, up to the first that does not.
     alike = (np.abs(a - b) <= apart[:, None, None]).all(axis=-1)
@@ -230,8 +239,9 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
     place = np.arange(_MOST)
     linked = place < first[:, None]
     crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
-    split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, apart, deepest)
-    split |= _turning(columns, left, linked, off_a, off_b)
+    split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, step, deepest)
+    turning = _turning(columns, left, linked, off_a, off_b)
+    split |= turning
     rows, places = np.nonzero(crossing)
     log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
     found = Brackets(
@@ -243,7 +253,7 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices]:
         off_b[rows, places],
         log_m,
     )
-    return found, left[split]
+    return found, left[split], left[turning & (step < _NARROWEST)]
 
 
 def _unlinked(
@@ -254,10 +264,11 @@ def _unlinked(
     n_a: Indices,
     n_b: Indices,
     first: Indices,
-    apart: Array,
+    step: Array,
     deepest: Array,
 ) -> NDArray[np.bool_]:
     """Where flows of neighbouring columns that do not go over into each other may hide the value asked for."""
+    apart = _APART + _BY_TEMPERATURE * step
     place = np.arange(_MOST)
     # From below, flows may go over into each other with other places.
     last = np.zeros_like(first)
@@ -282,7 +293,7 @@ def _unlinked(
         # An even number of them have met in pairs; of an odd number the last has left to larger hold-ups.
         paired = (loose.sum(axis=1) % 2 == 0) & (n_a != n_b)
         with np.errstate(invalid="ignore"):
-            aside = np.where(paired, _ASIDE * (high - low) + _LITTLE, np.inf)
+            aside = np.where(paired, _ASIDE * (high - low) + _AWAY * step + _LITTLE, np.inf)
             hidden |= any_loose & (low - np.minimum(aside, apart) <= 0.0) & (high + aside >= 0.0)
     return hidden
 
@@ -290,26 +301,20 @@ def _unlinked(
 def _turning(
     columns: Columns, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
 ) -> NDArray[np.bool_]:
-    """Where the quantity turns along a family so near to its value that it may pass it between the columns."""
-    out = np.zeros(len(left), dtype=bool)
-    # Pairs of gaps with a column between them.
-    one = np.flatnonzero(left[1:] == left[:-1] + 1)
-    two = one + 1
-    f0, f1, f2 = off_a[one], off_a[two], off_b[two]
-    s0 = (columns.log_t[left[one]] - columns.log_t[left[two]])[:, None]
-    s2 = (columns.log_t[left[two] + 1] - columns.log_t[left[two]])[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        same = ((f0 > 0.0) == (f1 > 0.0)) & ((f1 > 0.0) == (f2 > 0.0)) & linked[one] & linked[two]
-        nearest = (np.abs(f1) <= np.abs(f0)) & (np.abs(f1) <= np.abs(f2))
-        bend = ((f2 - f1) / s2 - (f1 - f0) / (-s0)) / (s2 - s0)
-        slope = (f2 - f1) / s2 - bend * s2
-        sag = slope**2 / (4.0 * np.abs(bend))
-        # The parabola is trusted no further than to its own size.
-        near = same & nearest & (np.abs(f1) <= 2.0 * sag + 0.05 * np.abs(bend) * np.maximum(s0**2, s2**2))
-    turning = near.any(axis=1)
-    out[one[turning]] = True
-    out[two[turning]] = True
-    return out
+    """The gaps, after the columns ``left``, in which the quantity may turn along a family so near to its value that it
+    passes it between columns without a change of sign, or more than once with one."""
+    step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
+    # Of all gaps in order, those between lanes missing.
+    slope = np.full((columns.lane.size - 1, _MOST), np.nan)
+    slope[left] = np.where(linked, (off_b - off_a) / step, np.nan)
+    change = np.abs(np.diff(slope, axis=0, prepend=np.nan, append=np.nan))
+    noise = np.ones((len(slope), 1))
+    noise[left] = _NOISE / step
+    turns = may_turn(slope, noise)[left]
+    reach = _SAG * step * np.nan_to_num(np.fmax(change[1:], change[:-1])[left]) + _NOISE
+    with np.errstate(invalid="ignore"):
+        turns &= (np.minimum(off_a, off_b) <= reach) & (np.maximum(off_a, off_b) >= -reach)
+    return turns.any(axis=1)
 
 
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:

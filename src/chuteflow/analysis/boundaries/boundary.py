@@ -15,9 +15,9 @@ from chuteflow.analysis.boundaries import seeds
 from chuteflow.analysis.boundaries.points import BoundaryPoint
 from chuteflow.analysis.boundaries.system import Sweep
 from chuteflow.analysis.boundaries.tracing import CONTROL, TracedBoundary, traced
+from chuteflow.analysis.families import TracedFamily
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
-from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -220,9 +220,12 @@ def boundary(
     def follow(points: Iterator[BoundaryPoint], share: float) -> None:
         for point in points:
             inside = within.contains(point.flow.solution.macroscopic)
-            if inside and not any(other.holds(point, tolerance) for other in found):
+            if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", share)
-                found.append(traced(point, within, tolerance, control, notice))
+                line = traced(point, within, tolerance, control, notice)
+                # A point that could not be told from those of a known line has led to it once more.
+                if not any(line.repeats(other) for other in found):
+                    found[:] = [other for other in found if not other.repeats(line)] + [line]
 
     values = np.linspace(sweep.low, sweep.high, samples).tolist()
     spacing = (sweep.high - sweep.low) / (samples - 1)

@@ -25,6 +25,7 @@ from typing import Protocol, Self, cast
 import numpy as np
 
 from chuteflow.numerics.chebyshev import Array, Grid, grid, interpolation_matrix, refinement
+from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
 from chuteflow.steady.model import IMAGINARY_STEP, LOSS, WORK
 
@@ -130,7 +131,7 @@ class Fold:
         matrix[:n, n], matrix[n, :n] = self.left, self.right
         side, solved = np.zeros(n + 1), np.empty((2, n + 1))
         side[n] = 1.0
-        solved[0], solved[1] = np.linalg.solve(matrix, side), np.linalg.solve(matrix.T, side)
+        solved[0], solved[1] = solve_each(matrix, side), solve_each(matrix.T, side)
         right, left = solved
         return float(right[n]), right[:n], left[:n]
 

@@ -12,11 +12,12 @@ import numpy as np
 from chuteflow.analysis.boundaries.system import BoundarySystem
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.newton import newton
+from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
+from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import IMAGINARY_STEP
-from chuteflow.steady.solver import DEGREES, Solution, Status, prolong
+from chuteflow.steady.solver import Solution, Status, prolong
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
 _STEP = 1e-7
@@ -57,7 +58,7 @@ def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance
         coarse = _quantities(system, result.z)
         system, w = finer(system, result.z, finer_degrees.pop(0))
         residual, jacobian = _bordered(system, w, row, value)
-        w = w - np.linalg.solve(jacobian, residual)
+        w = w - solve_each(jacobian, residual)
         change = float(np.abs(_quantities(system, w) - coarse).max())
         noise = _noise(system, w, jacobian)
         if change < max(tolerance, noise):
@@ -69,10 +70,8 @@ def shift(system: BoundarySystem, w: Array, row: Array) -> float:
     """How far the parameter is from the boundary, by the first step of Newton's method in the plane across ``row``
     (3,) through ``w``; infinitely far where the parameter has no say in it."""
     residual, jacobian = _bordered(system, w, row, float(row @ w[-3:]))
-    try:
-        return -float(np.linalg.solve(jacobian, residual)[-1])
-    except np.linalg.LinAlgError:
-        return np.inf
+    far = -float(solve_each(jacobian, residual)[-1])
+    return far if np.isfinite(far) else np.inf
 
 
 def through(system: BoundarySystem, w: Array, tolerance: float) -> BoundaryPoint:
@@ -94,7 +93,7 @@ def as_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     problem = system.problem(float(w[-1]))
     problem = replace(problem, model=replace(problem.model, chute=chute))
     z = w[:-1]
-    solution = Solution(problem, z, problem.state(z).macroscopic(), error, Status.CONVERGED)
+    solution = Solution(problem.state(z).macroscopic(), error, Status.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 
 
@@ -120,5 +119,5 @@ def _noise(system: BoundarySystem, w: Array, jacobian: Array) -> float:
     gradient[:-1, :3] = system.problem(float(w[-1])).state(w[:-1]).macroscopic_gradient()[:LOG_T].T
     by_parameter = system.local(w).stepped.macroscopic()[:LOG_T].imag / IMAGINARY_STEP
     gradient[-1] = np.append(by_parameter, 1.0 / _size(system, w))
-    sensitivity = np.abs(np.linalg.solve(jacobian.T, gradient)).sum(axis=0).max()
+    sensitivity = np.abs(solve_each(jacobian.T, gradient)).sum(axis=0).max()
     return max(_FLOOR, _NOISE * float(sensitivity))

@@ -15,9 +15,10 @@ from chuteflow.analysis.boundaries.seeds import FOLDS, HELD
 from chuteflow.analysis.boundaries.system import BoundarySystem, Sweep
 from chuteflow.analysis.boundaries.tracing import TracedBoundary, traced
 from chuteflow.analysis.enumeration import flows
+from chuteflow.analysis.families import TracedFamily
 from chuteflow.analysis.ranges import Range
-from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import InputError
+from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.solver import Solution
@@ -72,7 +73,7 @@ def limits(found: BoundarySet) -> list[Boundary]:
                 w = np.append(solution.z, value)
                 system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
                 point = solved(system, w, HELD, value, found.tolerance)
-                if not any(line.holds(point, found.tolerance) for line in lines):
+                if not any(line.holds(point) for line in lines):
                     lines.append(traced(point, wider, found.tolerance))
         out += [as_boundary("limit", found.second, line) for line in lines]
     return out
@@ -87,7 +88,7 @@ def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solut
 
 def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     """The kinds of the flows at smaller and at larger values of the second parameter, beside point ``index`` of a
-    boundary, with the quantity ``which`` held; None for folds."""
+    boundary, with the quantity ``which`` held; None for folds, and where that quantity has a fold itself."""
     point: BoundaryPoint = boundary.traced.points[index]
     condition = point.system.condition
     if isinstance(condition, Inversion):
@@ -100,5 +101,7 @@ def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     matrix = np.concatenate([at.by_z, at.state.macroscopic_gradient()[which][None]])
     moved = np.append(at.by_parameter, at.stepped.macroscopic()[which].imag / IMAGINARY_STEP)
     _, by_z, by_parameter = condition(at)
-    rate = by_parameter - float(by_z @ np.linalg.solve(matrix, moved))
+    rate = by_parameter - float(by_z @ solve_each(matrix, moved))
+    if not np.isfinite(rate):
+        return None
     return kinds if rate > 0.0 else (kinds[1], kinds[0])

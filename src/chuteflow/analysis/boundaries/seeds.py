@@ -20,12 +20,12 @@ import numpy as np
 from chuteflow.analysis.boundaries.conditions import Condition, Fold, InteriorChange, Inversion, Local
 from chuteflow.analysis.boundaries.points import BoundaryPoint, shift, solved, through
 from chuteflow.analysis.boundaries.system import BoundarySystem, Sweep
-from chuteflow.analysis.crossings import Chord
-from chuteflow.analysis.families import traced_families
+from chuteflow.analysis.families import TracedFamily, traced_families
+from chuteflow.analysis.paths import solve_between
 from chuteflow.analysis.ranges import Range
-from chuteflow.analysis.tracing import TracedFamily
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition as SolverCondition
@@ -38,8 +38,6 @@ KINDS = (*FOLDS, "density-inversion", "interior-change")
 HELD = np.array([0.0, 0.0, 1.0])
 #: A point is looked for this far beyond a chord, and found within so many of its lengths beside it.
 _BEYOND, _BESIDE = 0.02, 1.0
-#: A quantity that changes by less of the way along a family is uniform.
-_FLAT = 1e-7
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
 #: A boundary beside the families is looked for as far as so many times the distance to go to it.
@@ -71,7 +69,7 @@ class _Sample:
         matrix = np.concatenate([self.jacobian, (chord @ self.plane / (chord @ chord))[None]])
         side = np.zeros(len(matrix))
         side[-1] = 1.0
-        return float(self.gradient @ np.linalg.solve(matrix, side))
+        return float(self.gradient @ solve_each(matrix, side))
 
 
 def conditions(kind: str) -> Sequence[Condition]:
@@ -93,12 +91,11 @@ def on_families(
     far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
     for family in families:
         samples = [_sample(sweep, condition, value, solution) for solution in family.solutions]
-        found: list[BoundaryPoint] = []
-        for first, last in pairwise(samples):
-            for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
-                if not any(_same(point, other) for other in found):
-                    found.append(point)
-        yield from found
+        if isinstance(condition, Fold):
+            for turn in family.turns(condition.which, tolerance):
+                yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
+        else:
+            yield from _zeros(sweep, condition, value, samples, tolerance)
         for i, chord in _nearest(samples, condition):
             point = _beside(sweep, condition, value, samples[i].solution, chord, reach, tolerance)
             if point is not None:
@@ -110,6 +107,25 @@ def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]
     return traced_families(model(sweep.chute_at(value)), within)
 
 
+def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
+    """The point of the boundary at a value of the parameter, from its flow."""
+    w = np.append(solution.z, value)
+    system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+    return solved(system, w, HELD, value, tolerance)
+
+
+def _zeros(
+    sweep: Sweep, condition: Condition, value: float, samples: Sequence[_Sample], tolerance: float
+) -> list[BoundaryPoint]:
+    """The points along a family where the condition's function vanishes."""
+    found: list[BoundaryPoint] = []
+    for first, last in pairwise(samples):
+        for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
+            if not any(_same(point, other) for other in found):
+                found.append(point)
+    return found
+
+
 def _between(
     sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, tolerance: float, halvings: int
 ) -> Iterator[BoundaryPoint]:
@@ -117,30 +133,28 @@ def _between(
     chord = (last.solution.macroscopic - first.solution.macroscopic)[LOG_M:]
     if not chord.any():
         return
-    slopes = first.slope(chord), last.slope(chord)
-    ends = slopes if condition.turns else (first.value, last.value)
-    needed = (ends[0] > 0.0) != (ends[1] > 0.0)
-    places = _places(first.value, last.value, *slopes, turns=condition.turns)
+    needed = (first.value > 0.0) != (last.value > 0.0)
+    places = _places(first.value, last.value, first.slope(chord), last.slope(chord))
     if not needed and not places:
         return
     found = [p for p in (_near(sweep, condition, value, first, last, s, tolerance) for s in places) if p is not None]
     found = [p for i, p in enumerate(found) if not any(_same(p, q) for q in found[:i])]
-    if condition.turns and min(map(abs, slopes)) < _FLAT * float(np.hypot(*chord)):
-        yield from found  # the quantity is uniform there to rounding, which tells nothing of a turn
-    elif (len(found) % 2 == 1) == needed and len(found) == len(places):
+    if (len(found) % 2 == 1) == needed and len(found) == len(places):
         yield from found
     elif halvings:
-        middle = _sample(sweep, condition, value, Chord(first.solution, last.solution).at(0.5))
+        middle = _sample(sweep, condition, value, solve_between(first.solution, last.solution, 0.5))
         yield from _between(sweep, condition, value, first, middle, tolerance, halvings - 1)
         yield from _between(sweep, condition, value, middle, last, tolerance, halvings - 1)
     elif needed:
         raise SolveError("a point of a boundary was seen but not solved: narrow the range searched")
 
 
-def _places(f0: float, f1: float, d0: float, d1: float, *, turns: bool) -> list[float]:
-    """Where the cubic with these end values and slopes on [0, 1] turns, or vanishes, about in between."""
+def _places(f0: float, f1: float, d0: float, d1: float) -> list[float]:
+    """Where the cubic with these end values and slopes on [0, 1] vanishes, about in between."""
     cubic = np.array([2.0 * (f0 - f1) + d0 + d1, 3.0 * (f1 - f0) - 2.0 * d0 - d1, d0, f0])
-    roots = np.roots(np.polyder(cubic) if turns else cubic)
+    if not np.isfinite(cubic).all():
+        return []
+    roots = np.roots(cubic)
     real = roots[np.abs(roots.imag) <= 1e-12].real
     return sorted(np.clip(real[(real > -_BEYOND) & (real < 1.0 + _BEYOND)], 0.0, 1.0).tolist())
 
@@ -211,7 +225,7 @@ def _beside(
             break
         at += float(np.clip(ahead - at, -_STRIDE * reach, _STRIDE * reach))
         moved = replace(solution.problem, model=sweep.models(at)[0])
-        solution = resolve(replace(solution, problem=moved), plane, _ROUGH)
+        solution = resolve(replace(solution, source=(moved, solution.z)), plane, _ROUGH)
         if not solution.converged:
             return None
     else:

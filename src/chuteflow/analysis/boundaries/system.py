@@ -14,16 +14,23 @@ from functools import lru_cache
 import numpy as np
 
 from chuteflow.analysis.boundaries.conditions import Condition, Local
-from chuteflow.analysis.tracing import FamilySystem
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import Collocation
+from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.model import Model, model_along
+from chuteflow.steady.solver import default_stretch
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.laws import law
 
 #: Length, in the plane of ln T_surface and ln M, that counts as much as the whole range of the parameter.
 _SPAN = 6.0
+#: Weight of the gradient of the potential in the inner product.
+_OF_GRADIENT = 0.02
+#: Decay of the coefficients between which a grid is kept along a boundary.
+_RESOLVED, _WASTED = 1e-7, 1e-13
+#: The stretch is renewed when it is off by more.
+_STRETCH_OFF = 0.3
 
 
 @dataclass(frozen=True)
@@ -64,8 +71,9 @@ def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
 class BoundarySystem:
     """The steady problem and one condition, on a grid of ``degree`` and ``stretch``; unknowns (z, lambda).
 
-    The inner product is that of :class:`chuteflow.analysis.tracing.FamilySystem`, and the parameter added, whose
-    range counts as much as a factor of e^6 in T_surface or M.
+    The inner product is that of the plane (theta at the surface, ln M), with a little of the integral of g^2 over the
+    overburden, so that neither resolution nor stretch changes the path, and with the parameter, whose range counts as
+    much as a factor of e^6 in T_surface or M.
     """
 
     sweep: Sweep
@@ -76,7 +84,9 @@ class BoundarySystem:
     @property
     def weights(self) -> Array:
         """Of the unknowns, (n+4,)."""
-        return np.append(FamilySystem(self.problem(self.sweep.low)).weights, self.sweep.weight)
+        problem = self.problem(self.sweep.low)
+        by_quadrature = problem.grid.weights * problem.share[1]
+        return np.concatenate([_OF_GRADIENT * by_quadrature, [1.0, 1.0, self.sweep.weight]])
 
     def problem(self, value: float) -> Collocation:
         """The steady problem at a value of the parameter."""
@@ -103,14 +113,15 @@ class BoundarySystem:
 
     def adapted(self, w: Array, tangent: Array) -> tuple[BoundarySystem, Array, Array] | None:
         """Another grid or stretch where the flow asks for it, and other borders where the condition does."""
-        finer = FamilySystem(self.problem(float(w[-1]))).adapted(w[:-1], tangent[:-1])
-        if finer is None:
+        other = _suited(self.problem(float(w[-1])), w[:-1])
+        if other is None:
             at = self.local(w)
             if self.condition.suits(at):
                 return None
             return replace(self, condition=self.condition.based(at)), w, tangent
-        family, z, direction = finer
-        return self.moved(family.problem, np.append(z, w[-1])), np.append(z, w[-1]), np.append(direction, tangent[-1])
+        problem, matrix = other
+        moved, direction = (np.concatenate([matrix @ v[:-3], v[-3:]]) for v in (w, tangent))
+        return self.moved(problem, moved), moved, direction
 
     def moved(self, problem: Collocation, w: Array) -> BoundarySystem:
         """The system on the grid of ``problem``, where ``w`` is about the solution."""
@@ -124,3 +135,20 @@ class BoundarySystem:
         root = np.sqrt(np.maximum(self.weights, 1e-12))
         _, _, v = np.linalg.svd(jacobian / root)
         return v[-1] / root
+
+
+def _suited(problem: Collocation, z: Array) -> tuple[Collocation, Array] | None:
+    """A finer or coarser grid, or another stretch, where the flow asks for it, with the matrix that takes g to it."""
+    state = problem.state(z)
+    decay = tail(problem.grid, state.y + 1e-30)
+    place = DEGREES.index(problem.degree)
+    if decay > _RESOLVED and place + 1 < len(DEGREES):
+        place += 1
+    elif decay < _WASTED and place > 0:
+        place -= 1
+    stretch = default_stretch(problem.model, float(state.mass[0]), float(np.exp(state.log_t[0])))
+    if abs(stretch - problem.stretch) < _STRETCH_OFF:
+        if DEGREES[place] == problem.degree:
+            return None
+        stretch = problem.stretch
+    return problem.transferred(DEGREES[place], stretch)

@@ -17,8 +17,8 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
 from chuteflow.steady.collocation import LOG_M
+from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.model import IMAGINARY_STEP
-from chuteflow.steady.solver import DEGREES
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
 CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
@@ -29,6 +29,9 @@ _SINGULAR = 1e-5
 #: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
 _BESIDE, _SAME = 0.3, 1e-6
+#: To tell whether points are the same they are solved to this; where even that fails, what lies within this part of a
+#: chord's length beside it is on the line; and so many points of a line tell whether it is a known one.
+_TOLD, _ON_CHORD, _TELLING = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
 #: A parameter that changes less, per arclength, does not change.
@@ -62,7 +65,7 @@ class TracedBoundary:
     turns: tuple[Turn, ...]
     ends: tuple[str, str]
 
-    def holds(self, point: BoundaryPoint, tolerance: float) -> bool:
+    def holds(self, point: BoundaryPoint) -> bool:
         """Whether a point is of this boundary: on one of its chords lies a point equal to it."""
         places = np.array([self._place(p) for p in self.points])
         chords = np.diff(places, axis=0)
@@ -71,7 +74,13 @@ class TracedBoundary:
         sigma = (gap * chords).sum(axis=1) / lengths**2
         beside = np.sqrt(((gap - sigma[:, None] * chords) ** 2).sum(axis=1))
         near = (sigma > -_BESIDE) & (sigma < 1.0 + _BESIDE) & (beside < _BESIDE * lengths)
-        return any(self._meets(int(i), float(sigma[i]), point, tolerance) for i in np.flatnonzero(near))
+        close = (sigma >= -_ON_CHORD) & (sigma <= 1.0 + _ON_CHORD) & (beside < _ON_CHORD * lengths)
+        return any(self._meets(int(i), float(sigma[i]), point, bool(close[i])) for i in np.flatnonzero(near))
+
+    def repeats(self, other: TracedBoundary) -> bool:
+        """Whether this is a part of another boundary, or the whole of it."""
+        some = np.linspace(0, len(self.points) - 1, _TELLING + 2)[1:-1].round().astype(int)
+        return sum(other.holds(self.points[i]) for i in some.tolist()) > _TELLING // 2
 
     def at(self, value: float, tolerance: float) -> list[BoundaryPoint]:
         """The points at which the parameter has a ``value``, in order.
@@ -92,16 +101,17 @@ class TracedBoundary:
             out.append(solved(one.system, w, HELD, value, tolerance))
         return out
 
-    def _meets(self, i: int, sigma: float, point: BoundaryPoint, tolerance: float) -> bool:
+    def _meets(self, i: int, sigma: float, point: BoundaryPoint, close: bool) -> bool:
+        """Whether the point is on chord i, at ``sigma``; ``close`` says so where no point there can be solved."""
         one, other = self.points[i], self.points[i + 1]
         system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
-            there = solved(system, w, row, float(row @ point.w[-3:]), tolerance)
+            there = solved(system, w, row, float(row @ point.w[-3:]), _TOLD)
         except SolveError:
-            return False
+            return close
         gap = there.flow.solution.macroscopic - point.flow.solution.macroscopic
-        return bool(np.abs(gap).max() < _SAME)
+        return bool(np.abs(gap).max() < _SAME + there.error + point.error)
 
     def _place(self, point: BoundaryPoint) -> Array:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)

@@ -26,12 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.ranges import Range
-from chuteflow.analysis.trajectories import surface_potential
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.tabulate import Table
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, GRIP, LOSS, SHEAR, WORK, Model, evaluate_closures, model
 from chuteflow.theory import boundary
+from chuteflow.trajectories.surface import surface_potential
 
 #: Step in tau, and the largest step in p over the shortest length of the equations.
 _STEP, _LENGTHS_PER_STEP = 0.25, 0.6

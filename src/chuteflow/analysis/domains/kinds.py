@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from contourpy import contour_generator
+from numpy.typing import NDArray
 
 from chuteflow.analysis.domains.fan import (
     EXCESS,
@@ -30,6 +31,7 @@ from chuteflow.analysis.domains.fan import (
     Fan,
     lagrange,
 )
+from chuteflow.analysis.rough_turns import dips
 from chuteflow.numerics.chebyshev import Array
 
 #: Bits of the kinds that are present among the flows of a chute.
@@ -244,10 +246,10 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
     log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
-    before = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
+    before, share = _changes(rise, at)
     stops = log_q[[0, -1]]
     if before.size:
-        turns = at[before] + (at[before + 1] - at[before]) * rise[before] / (rise[before] - rise[before + 1])
+        turns = at[before] + (at[before + 1] - at[before]) * share
         if len(at) > 3:
             around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
             turned = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
@@ -258,6 +260,19 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
         stops = np.array(_confirmed([log_q[0], *turned, log_q[-1]], first))
     ends = np.stack([stops[:-1], stops[1:]], axis=1)
     return np.sort(ends, axis=1)
+
+
+def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
+    """The steps in which ``rise`` changes sign, and the shares of them at which it does so; a step in which it passes
+    zero twice, as just beyond a cusp, is there twice."""
+    changes = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
+    pairs = [(dip.step, zero) for dip in dips(rise, at) if len(dip.zeros) == 2 for zero in dip.zeros]
+    steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
+    shares = np.concatenate(
+        [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]
+    )
+    order = np.lexsort((shares, steps))
+    return steps[order], shares[order]
 
 
 def _confirmed(stops: list[float], rises: float) -> list[float]:

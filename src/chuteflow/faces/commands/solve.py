@@ -104,4 +104,6 @@ def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
         yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
     else:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
+    if found.incomplete:
+        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
     yield words.searched(found.searched, found.chute, scales)

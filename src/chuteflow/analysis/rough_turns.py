@@ -1,0 +1,55 @@
+"""Where quantities known at the points of a rough path alone may turn, or pass zero and come back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+
+
+def may_turn(slope: Array, noise: Array | float = 0.0) -> NDArray[np.bool_]:
+    """Whether a quantity may turn in the steps of a rough path, given its ``slope`` (k, ...) in each by differences,
+    which are known to ``noise``; NaN where a step is missing.
+
+    So it may where the slope changes as much from step to step as it is large: then it, or within the step its own
+    turn, may have reached zero. A step without neighbours tells nothing, and it may turn there.
+    """
+    change = np.abs(np.diff(slope, axis=0))
+    none = np.full_like(slope[:1], np.nan)
+    beside = np.fmax(np.concatenate([none, change]), np.concatenate([change, none]))
+    with np.errstate(invalid="ignore"):
+        return ~(np.abs(slope) > beside + noise) & np.isfinite(slope)
+
+
+@dataclass(frozen=True, eq=False)
+class Dip:
+    """A step of a path between two values of one sign: the cubic with slopes by differences comes nearest to zero, or
+    passes it furthest, at the ``share`` of the step, where it has the ``value``, with ``zeros`` to either side if it
+    passes it."""
+
+    step: int
+    share: float
+    value: float
+    zeros: tuple[float, ...]
+
+
+def dips(values: Array, at: Array) -> list[Dip]:
+    """The steps between the places ``at`` (k,) of a path in which ``values`` (k,) turn towards zero, and away again."""
+    if len(values) < 3:
+        return []
+    slope = np.gradient(values, at)
+    length = np.diff(at)
+    d0, d1 = slope[:-1] * length * np.sign(values[:-1]), slope[1:] * length * np.sign(values[:-1])
+    out = []
+    for i in np.flatnonzero((values[1:] * values[:-1] > 0.0) & (d0 < 0.0) & (d1 > 0.0)).tolist():
+        (f0, f1), sign = np.abs(values[i : i + 2]), np.sign(values[i])
+        cubic = np.array([2.0 * (f0 - f1) + d0[i] + d1[i], 3.0 * (f1 - f0) - 2.0 * d0[i] - d1[i], d0[i], f0])
+        turning, zeros = np.roots(np.polyder(cubic)).real, np.roots(cubic)
+        share = min(turning[(turning > 0.0) & (turning < 1.0)], key=lambda x: np.polyval(cubic, x), default=0.5)
+        lowest = float(np.polyval(cubic, share))
+        inside = zeros.real[(zeros.imag == 0.0) & (zeros.real > 0.0) & (zeros.real < 1.0)] if lowest < 0.0 else ()
+        out.append(Dip(i, float(share), sign * lowest, tuple(sorted(map(float, inside)))))
+    return out

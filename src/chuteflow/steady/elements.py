@@ -1,0 +1,208 @@
+"""A steady flow as polynomials on elements of the overburden coordinate, and Newton's method for it.
+
+# notation: s grid coordinate, m = P/M fraction of the overburden, theta heat potential, y = q/(p sqrt(T)) heat flux.
+
+Collocation at Gauss points (C. de Boor and B. Swartz 1973, SIAM J. Numer. Anal. 10, 582-606): theta and y are
+continuous, of degree :data:`chuteflow.steady.kernel.STAGES` on each element, and satisfy the equations of
+:mod:`chuteflow.steady.model` at the Gauss points. Integrals over the depth and values at the ends of the elements
+converge with twice that order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from chuteflow.numerics.chebyshev import Array, interpolation_matrix, tail
+from chuteflow.steady import kernel
+from chuteflow.steady.collocation import Collocation, stretch_map, stretch_position
+from chuteflow.steady.kernel import STAGES
+from chuteflow.steady.model import CONDUCTION, Model
+
+#: Change of theta, and of y over its scale, on one element at most; and its longest part of the grid.
+_CHANGE, _CHANGE_OF_FLUX, _LONGEST = 1.0, 0.5, 0.26
+#: Degrees of Chebyshev grids for a flow, and the decay of the coefficients with which one may resolve it.
+DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
+_ROUGHLY = 1e-6
+#: Where none does: the degree of a grid on each piece, of so many elements.
+_PIECE, _PER_PIECE = 24, 6
+#: Elements at most.
+MOST_ELEMENTS = 768
+
+
+def _gauss() -> tuple[Array, Array, Array, Array]:
+    """Gauss points and weights on [0, 1] (2, STAGES); integrals (STAGES, STAGES) of the cardinal polynomials up to
+    the points; the inverse of that; and the coefficients of t, t^2, ... of these integrals."""
+    points, weights = np.polynomial.legendre.leggauss(STAGES)
+    points, weights = 0.5 * (points + 1.0), 0.5 * weights
+    powers = np.arange(1, STAGES + 1)
+    coefficients = np.linalg.inv(points[:, None] ** (powers - 1)) / powers[:, None]
+    integrals = points[:, None] ** powers @ coefficients
+    return np.stack([points, weights]), integrals, np.linalg.inv(integrals), coefficients
+
+
+_GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """theta and y on the elements between ``breaks`` (N+1,), in the grid coordinate with one ``stretch``.
+
+    ``ends`` (N+1, 2) are theta and y there, ``slopes`` (N, STAGES, 2) their derivatives at the Gauss points, and
+    ``log_mass`` is ln M.
+    """
+
+    model: Model
+    stretch: float
+    breaks: Array
+    ends: Array
+    slopes: Array
+    log_mass: float
+
+    @classmethod
+    def sample(
+        cls, model: Model, stretch: float, log_mass: float, s: Array, values: Callable[[Array], Array]
+    ) -> Elements:
+        """The polynomials through ``values`` (k,) -> (k, 2) of theta and y, on elements chosen by those at ``s``."""
+        rough = values(s)
+        breaks = kernel.distribute(
+            s, rough[:, 0] / _CHANGE, rough[:, 1], 1.0 / (_CHANGE_OF_FLUX * model.flux_scale), _LONGEST
+        )
+        return cls._through(model, stretch, log_mass, breaks, values(kernel.places(breaks, _GAUSS[0])))
+
+    @classmethod
+    def _through(cls, model: Model, stretch: float, log_mass: float, breaks: Array, values: Array) -> Elements:
+        count = len(breaks) - 1
+        ends, slopes = np.empty((count + 1, 2)), np.empty((count, STAGES, 2))
+        kernel.fit(breaks, np.ascontiguousarray(values), _DIFFERENCES, ends, slopes)
+        return cls(model, stretch, breaks, ends, slopes, log_mass)
+
+    @classmethod
+    def of_collocation(cls, problem: Collocation, z: Array) -> Elements:
+        """The same flow, from unknowns on a Chebyshev grid."""
+        state = problem.state(z)
+        theta_and_y = np.stack([state.theta, state.y], axis=1)
+        stretch = max(float(np.reshape(problem.stretch, ())), 1e-9)
+        return cls.sample(
+            problem.model,
+            stretch,
+            float(z[-1]),
+            problem.grid.nodes,
+            lambda s: interpolation_matrix(problem.grid, s) @ theta_and_y,
+        )
+
+    def grids(self) -> Iterator[tuple[Collocation, Array]]:
+        """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to
+        about 1e-8: between the ends of the elements the polynomials have no more digits.
+
+        Last comes one with a grid on each of some pieces.
+        """
+        for degree in DEGREES:
+            problem = Collocation(self.model, degree, self.stretch)
+            z, y = self._unknowns(problem)
+            if tail(problem.grid, np.stack([z[:-2] / np.abs(z[:-2]).max(), y / np.abs(y).max()]) + 1e-30) < _ROUGHLY:
+                yield problem, z
+        inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
+        problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
+        yield problem, self._unknowns(problem)[0]
+
+    def _unknowns(self, problem: Collocation) -> tuple[Array, Array]:
+        """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""
+        theta, y = self.at(problem.grid.nodes).T
+        mass = np.exp(self.log_mass)
+        p = mass * problem.share[0] + self.model.surface_stress
+        f, _ = self.model.closures(p * np.exp(-theta))
+        return np.concatenate([mass * y / f[CONDUCTION], [theta[0], self.log_mass]]), y
+
+    def at(self, s: Array) -> Array:
+        """theta and y at grid coordinates ``s`` (k,) ascending, (k, 2)."""
+        out = np.empty((len(s), 2))
+        kernel.evaluate(self.breaks, self.ends, self.slopes, _CARDINAL, s, out)
+        return out
+
+    def at_fraction(self, m: Array) -> Array:
+        """theta and y where the fractions ``m`` (k,) ascending of the overburden lie above, (k, 2)."""
+        return self.at(np.clip(stretch_position(m, self.stretch), 0.0, 1.0))
+
+    @cached_property
+    def _places(self) -> Array:
+        return kernel.places(self.breaks, _GAUSS[0])
+
+    def adapted(self, stretch: float) -> Elements:
+        """The same flow on elements chosen anew, with another stretch."""
+        return self.blended(self, 0.0, stretch)
+
+    def blended(self, other: Elements, fraction: float, stretch: float) -> Elements:
+        """``fraction`` of the way to another flow, also beyond it, on elements that suit this one."""
+        s = kernel.positions(self._places, self.stretch, stretch)
+
+        def values(s: Array) -> Array:
+            m, _ = stretch_map(s, stretch)
+            here = self.at_fraction(m)
+            return here if fraction == 0.0 else here + fraction * (other.at_fraction(m) - here)
+
+        log_mass = self.log_mass + fraction * (other.log_mass - self.log_mass)
+        return Elements.sample(self.model, stretch, log_mass, s, values)
+
+    def halved(self) -> Elements:
+        """The same polynomials on elements of half the length."""
+        breaks = np.empty(2 * len(self.breaks) - 1)
+        breaks[::2] = self.breaks
+        breaks[1::2] = 0.5 * (self.breaks[1:] + self.breaks[:-1])
+        values = self.at(kernel.places(breaks, _GAUSS[0]))
+        return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
+
+    def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
+        """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
+        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is asked for."""
+        ends, slopes = self.ends.copy(), self.slopes.copy()
+        quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
+        errors = np.zeros((2 if rounding else 0, 4))
+        mu, step = kernel.iterate(
+            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            ends, slopes, self.log_mass, weights, value, tolerance, most, quantities, rates,
+            errors,
+        )  # fmt: skip
+        return Iterate(
+            Elements(self.model, self.stretch, self.breaks, ends, slopes, mu), quantities, rates, errors, step
+        )
+
+    def direction(self, weights: Array) -> tuple[Array, Elements] | None:
+        """The change along the branch for which the macroscopic quantities, times ``weights`` (4,), change by 1.
+
+        Returns the derivatives (4,) of ln Q, ln h, ln M and ln T_surface, and those of the unknowns, in the place of
+        the unknowns; None where the condition turns.
+        """
+        change, ends, slopes = np.empty(4), np.empty_like(self.ends), np.empty_like(self.slopes)
+        mu, found = kernel.direction(
+            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.ends, self.slopes, self.log_mass, weights, change, ends, slopes,
+        )  # fmt: skip
+        return (change, Elements(self.model, self.stretch, self.breaks, ends, slopes, mu)) if found else None
+
+    def moved(self, along: Elements, length: float) -> Elements:
+        """The unknowns moved by ``length`` times their change ``along`` a branch."""
+        return Elements(
+            self.model,
+            self.stretch,
+            self.breaks,
+            self.ends + length * along.ends,
+            self.slopes + length * along.slopes,
+            self.log_mass + length * along.log_mass,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """What Newton's method came to: the flow, its ``quantities`` ln Q, ln h, ln M and ln T_surface (4,), their
+    ``rates`` with the value of the condition along the branch (4,), what rounding may do to them, the ``errors`` (k,
+    4), and the size of the last ``step``, infinite where the method failed."""
+
+    flow: Elements
+    quantities: Array
+    rates: Array
+    errors: Array
+    step: float

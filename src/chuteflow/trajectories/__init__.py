@@ -1,0 +1,1 @@
+"""The initial value problem from the surface down, on a grid of trajectories that refines itself."""

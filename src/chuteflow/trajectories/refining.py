@@ -1,0 +1,203 @@
+"""The grid of trajectories that refines itself, and the rough branches of flows that it shows.
+
+# notation: P overburden, L = ln x, y heat flux over p sqrt(T), B the residual of the base condition.
+
+All flows of a chute in a range of surface temperatures and hold-ups are the zeros of one function B(T_surface, P). At
+each depth the states (L, y) of all trajectories form a curve, labelled by the surface temperature. It is carried down;
+where it stretches, trajectories are inserted at that depth, so that what is separated by less than rounding of the
+surface temperature is still told apart. A part of the curve is dropped only where it lies in a region that no
+trajectory leaves, and in which B has one sign (:func:`chuteflow.trajectories.kernel.region_of`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import stretch_map, stretch_position
+from chuteflow.steady.elements import Elements
+from chuteflow.steady.model import GAMMA, Model
+from chuteflow.steady.solver import default_stretch
+from chuteflow.trajectories import kernel
+from chuteflow.trajectories.kernel import S_G, S_H, S_L, S_T, START
+from chuteflow.trajectories.surface import surface_potential
+from chuteflow.trajectories.tables import Tables, tables
+
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How finely trajectories are followed.
+
+    Attributes:
+        delta: largest distance of neighbours in the plane of ln x and heat flux (in units of its scale); a larger
+            one misses what winds more closely.
+        finest: smallest distance at which a neighbour is inserted where the residual of the base condition turns
+            towards zero between two; a larger one misses pairs of flows beside a fold.
+        per_decade: trajectories per decade of surface temperature at the surface.
+        step: step in tau = ln P + P/p_1; larger ones are less accurate.
+        lengths: largest step in P over the shortest length of the equations.
+        most: states kept at most, 48 bytes each; beyond, the search ends at the depth that it has reached, and says so.
+    """
+
+    delta: float = 0.4
+    finest: float = 0.025
+    per_decade: float = 12.0
+    step: float = 0.25
+    lengths: float = 0.6
+    most: int = 1_200_000
+
+
+#: The refinement of every search unless another is asked for.
+REFINEMENT = Refinement()
+#: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
+#: overburden.
+_THIN, _THIN_STEP, _LEAST = 80, 0.25, 5e-10
+
+
+@dataclass(frozen=True, eq=False)
+class RoughBranch:
+    """The zeros of B along one branch of flows: their places (k,) among those of ``grid``, and their ``macroscopic``
+    quantities ln Q, ln h, ln M, ln T_surface (k, 4), to about 1e-3. ``closed`` where the last is next to the first."""
+
+    grid: TrajectoryGrid
+    zeros: Index
+    macroscopic: Array
+    closed: bool
+
+    def __len__(self) -> int:
+        return len(self.zeros)
+
+    def start(self, i: int) -> Elements:
+        """Where Newton's method may start from for the flow at place ``i``."""
+        return self.grid.start(int(self.zeros[i]))
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryGrid:
+    """The trajectories of one chute at depths ``overburden`` (R,), and the zeros of B on them.
+
+    ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
+    curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
+    row before, between two states where it was inserted. ``zeros`` (Z, 3) are the two states between which B vanishes,
+    and the fraction of the way. ``unresolved`` (U,) are states that are too far from their neighbour beside a zero.
+    ``complete`` tells whether the curve was carried to the last depth.
+    """
+
+    model: Model
+    overburden: Array
+    states: Array
+    came_from: Array
+    first: Index
+    zeros: Array
+    links: Index
+    unresolved: Index
+    complete: bool
+
+    @property
+    def deepest(self) -> float:
+        """The overburden down to which the curve was carried."""
+        if self.complete:
+            return float(self.overburden[-1])
+        return float(self.overburden[max(int(np.searchsorted(self.first, len(self.states), side="left")) - 1, 0)])
+
+    def _rows(self, places: Index) -> Index:
+        return np.searchsorted(self.first, places, side="right") - 1
+
+    @cached_property
+    def macroscopic(self) -> Array:
+        """ln Q, ln h, ln M, ln T_surface at the zeros, (Z, 4)."""
+        model = self.model
+        ends = self.zeros[:, :2].astype(np.int64)
+        state = self.states[ends]
+        over = self.overburden[self._rows(ends)]
+        f, _ = model.closures(np.exp(state[..., S_L]))
+        root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
+        flux = model.slip(f) * root_t * over + state[..., S_G]
+        values = np.stack([np.log(flux), np.log(state[..., S_H] / over), np.log(over), state[..., S_T]], axis=-1)
+        return values[:, 0] + self.zeros[:, 2:] * (values[:, 1] - values[:, 0])
+
+    @cached_property
+    def branches(self) -> tuple[RoughBranch, ...]:
+        """The branches of flows, the longest first."""
+        order, starts = kernel.walk(self.links)
+        found = []
+        for begin, end in pairwise(starts.tolist()):
+            zeros = order[begin:end]
+            closed = bool(len(zeros) > 2 and self.links[zeros[0], 1] >= 0)
+            found.append(RoughBranch(self, zeros, self.macroscopic[zeros], closed))
+        return tuple(sorted(found, key=len, reverse=True))
+
+    def start(self, zero: int) -> Elements:
+        """The rough flow at a zero, on elements."""
+        model = self.model
+        one, other, fraction = int(self.zeros[zero, 0]), int(self.zeros[zero, 1]), float(self.zeros[zero, 2])
+        rows = self._rows(np.array([one, other]))
+        place = one + fraction if rows[0] == rows[1] else float(other)
+        back = kernel.trace_back(self.states, self.came_from, place, int(rows[1]))
+        log_mass, log_t = self.macroscopic[zero, 2:]
+        mass, temperature = float(np.exp(log_mass)), float(np.exp(log_t))
+        over = self.overburden[: len(back)]
+        theta = np.log(over + model.surface_stress) - back[:, 0]
+        per_mass = (back[:, 1] - model.surface_flux) / over
+        log_over = np.log(over)
+        stretch = default_stretch(model, mass, temperature)
+        surface = float(surface_potential(model, np.array([temperature]))[0])
+
+        def values(s: Array) -> Array:
+            m, _ = stretch_map(s, stretch)
+            at = np.log(np.maximum(mass * m, 1e-300))
+            flux = np.interp(at, log_over, per_mass) * mass * m + model.surface_flux
+            return np.stack([np.interp(at, log_over, theta, left=surface), flux], axis=1)
+
+        s = np.clip(stretch_position(over / mass, stretch), 0.0, 1.0)
+        inside = s < 1.0
+        return Elements.sample(model, stretch, float(log_mass), np.concatenate([[0.0], s[inside], [1.0]]), values)
+
+
+@lru_cache(maxsize=4)
+def carry_down(
+    model: Model, coldest: float, hottest: float, deepest: float, refinement: Refinement = REFINEMENT
+) -> TrajectoryGrid:
+    """The grid of trajectories of ``model`` from surface temperatures ``coldest`` to ``hottest`` down to the hold-up
+    ``deepest``. Those of the last few chutes are remembered: one asks for other flows of the same chute next."""
+    t = tables(model)
+    p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
+    overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
+    decades = np.log10(hottest / coldest)
+    temperature = np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
+    states, came_from, first, zeros, links, unresolved, status = kernel.carry(
+        t.values, t.bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
+        _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
+        refinement.delta, 1.0 / t.scale, refinement.finest, refinement.most,
+    )  # fmt: skip
+    return TrajectoryGrid(model, overburden, states, came_from, first, zeros, links, unresolved, status == kernel.DONE)
+
+
+def _start_at_most(t: Tables) -> float:
+    return START / max(t.rate, 1.0)
+
+
+def _depths(model: Model, t: Tables, coldest: float, deepest: float, p_1: float, step: float) -> Array:
+    """Overburdens evenly in tau = ln P + P/p_1, and evenly in ln P close to the surface of the half-line."""
+    if model.surface_stress:
+        first, thin = _LEAST, np.zeros(0)
+    else:
+        first = min(START * coldest, _start_at_most(t), 0.5 * deepest)
+        thin = first * np.exp(-_THIN_STEP * np.arange(_THIN, 0, -1))
+    low, high = np.log(first) + first / p_1, np.log(deepest) + deepest / p_1
+    tau = np.linspace(low, high, int(np.ceil((high - low) / step)) + 1)
+    # ln P by Newton's method: tau is convex in it, so that starting on the high side it comes down.
+    log_p = np.minimum(np.where(tau < 0.0, tau, np.log(p_1 * np.maximum(tau, 1.0) + 1.0)), np.log(deepest))
+    for _ in range(60):
+        change = (log_p + np.exp(log_p) / p_1 - tau) / (1.0 + np.exp(log_p) / p_1)
+        log_p = log_p - change
+        if np.abs(change).max() < 1e-13:
+            break
+    return np.concatenate([thin, np.exp(log_p)])

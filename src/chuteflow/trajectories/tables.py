@@ -1,0 +1,64 @@
+"""The functions of ln x that trajectories need, on a fine uniform grid.
+
+# notation: L = ln x, y = q/(p sqrt(T)), a, k, net = loss - s^2 work as in chuteflow.steady.model, b the heat flux y
+# that a base would give.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from chuteflow.numerics.tabulate import Array
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+
+#: The table runs over LOW <= ln x <= LOW + (ENTRIES - 1)/PER_UNIT; outside, the functions are constant.
+LOW, PER_UNIT, ENTRIES = -25.0, 48.0, 4096
+#: Columns of a table: 1/a, k, net, b, work, ln(nu/x), Gamma, slip coefficient.
+INVERSE, COUPLED, NET, BASE, WORKED, LOG_NU, POTENTIAL, SLIP = range(8)
+#: Columns of the bounds: see :class:`Tables`.
+(
+    NET_LOW, NET_HIGH, CURVE_LOW, CURVE_HIGH, RELAX_HIGH, SPREAD, BASE_LOW, BASE_HIGH,
+    NET_ABOVE, CURVE_ABOVE, RELAX_ABOVE, BASE_ABOVE,
+) = range(12)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """What the trajectories of one model need.
+
+    ``values`` (entries, 8) are the functions; ``bounds`` (entries, 12) are extrema of them over all smaller L (net
+    from both sides, A = (1 - k)/(2 a) from both sides, the largest 1 + k/2, the largest a, b from both sides) and
+    over all larger L (the largest net, the smallest A, the largest 1 + k/2, the smallest b). ``rate`` is the fastest
+    rate of y in p, and ``scale`` the size of heat fluxes y.
+    """
+
+    values: Array
+    bounds: Array
+    rate: float
+    scale: float
+
+
+@lru_cache(maxsize=64)
+def tables(model: Model) -> Tables:
+    """The tables of ``model``."""
+    f, _ = model.closures(np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
+    conduction, coupling = f[CONDUCTION], f[COUPLING]
+    net = f[LOSS] - model.slope**2 * f[WORK]
+    base = model.base_flux(f)
+    values = np.stack([1.0 / conduction, coupling, net, base, f[WORK], f[DENSITY], f[GAMMA], model.slip(f)], axis=1)
+    curve = 0.5 * (1.0 - coupling) / conduction
+    relax = 1.0 + 0.5 * coupling
+    lowest, highest = np.minimum.accumulate, np.maximum.accumulate
+    bounds = np.stack(
+        [
+            lowest(net), highest(net), lowest(curve), highest(curve), highest(relax), highest(conduction),
+            lowest(base), highest(base),
+            highest(net[::-1])[::-1], lowest(curve[::-1])[::-1], highest(relax[::-1])[::-1], lowest(base[::-1])[::-1],
+        ],
+        axis=1,
+    )  # fmt: skip
+    rate = float(np.sqrt(2.0 * np.abs(net) / conduction).max())
+    return Tables(values, bounds, rate, model.flux_scale)
