@@ -64,7 +64,8 @@ def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
     for answer in answers:
         flow = flow_object(answer.flow)
         start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]
-        stable = "" if answer.found is None else str(answer.found.stable).lower()
+        known = None if answer.found is None else answer.found.stable
+        stable = "" if known is None else str(known).lower()
         for mode in answer.modes or (None,):
             numbers = {} if mode is None else mode_object(mode)
             cells = [numbers.get(name) for name in COLUMNS[5:]]
@@ -80,6 +81,23 @@ def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
         "stable": None if found is None else found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
+        "grows": None if found is None or found.mode is None else found.grows,
+        "threshold": None if found is None else found.smallest_rate,
         "wavenumbers": None if found is None else list(found.searched),
-        "why": answer.reason,
+        "complete": False if found is None else found.complete,
+        "examined": 0 if found is None else found.examined,
+        "unresolved": [] if found is None else [{"kx": kx, "ky": ky} for kx, ky in found.unresolved],
+        "why": answer.reason or (None if found is None else why_unknown(found)),
     }
+
+
+def why_unknown(found: Stability) -> str | None:
+    """Why ``stable`` is None, or None where it is not."""
+    if found.stable is not None:
+        return None
+    if not found.complete:
+        return "one wave or one direction was examined: without --kx and --ky all are searched"
+    return (
+        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids do not "
+        "tell whether something does"
+    )
