@@ -159,6 +159,8 @@ def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
 
 
 _CLOSED = "its own beginning: it is closed"
+#: Why a curve ends that leaves the plane.
+EDGE = "the edge of the range"
 
 
 def _side(
@@ -174,7 +176,7 @@ def _side(
         if edge is not None:
             if out:
                 out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
-            return out, "the edge of the range"
+            return out, EDGE
         judged = system.judged(point.z)
         if judged.error > _ASTRAY:
             return out, "where the mode runs into the continuous spectrum"

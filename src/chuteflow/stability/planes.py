@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.stability.along import flow_between
+from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
 from chuteflow.stability.verdict import stability_of

@@ -42,5 +42,6 @@ def judged(flow: Flow) -> tuple[dict[str, float], str | None]:
             "kx": found.mode.kx,
             "ky": found.mode.ky,
         }
-    unresolved = f"{len(found.unresolved)} wavenumbers are unresolved" if found.unresolved else None
-    return out, unresolved
+    if found.stable is not None:
+        return out, None
+    return out, f"whether something grows is not told at {len(found.unresolved)} wavenumbers, and nothing else grows"
