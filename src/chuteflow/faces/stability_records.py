@@ -10,6 +10,7 @@ import numpy as np
 
 from chuteflow.analysis.results import FlowSet
 from chuteflow.faces.contract import chute_object, finite, flow_object, searched_object
+from chuteflow.stability.budget import Budget, energy_budget
 from chuteflow.stability.modes import Mode
 from chuteflow.stability.verdict import Stability
 from chuteflow.steady.flow import Flow
@@ -58,6 +59,24 @@ def mode_object(mode: Mode, *, fields: bool = False) -> dict[str, Any]:
     return numbers
 
 
+def budget_object(budget: Budget) -> dict[str, Any]:
+    """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates."""
+    return {
+        "growth": finite(budget.mode.growth),
+        "closure": finite(budget.closure),
+        "shares": dict(zip(("kinetic", "density", "thermal"), map(finite, budget.shares), strict=True)),
+        "terms": {
+            term.name: {
+                "kinetic": finite(term.kinetic),
+                "density": finite(term.density),
+                "thermal": finite(term.thermal),
+                "total": finite(term.total),
+            }
+            for term in budget.terms
+        },
+    }
+
+
 def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
     """A head and one row for each mode, or one for a flow without; empty where there is no number."""
     rows: list[list[str]] = [list(COLUMNS)]
@@ -81,6 +100,7 @@ def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
         "stable": None if found is None else found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
+        "budget": None if not answer.modes else budget_object(energy_budget(answer.modes[0])),
         "grows": None if found is None or found.mode is None else found.grows,
         "threshold": None if found is None else found.smallest_rate,
         "wavenumbers": None if found is None else list(found.searched),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from numbers import Integral
 
 import numpy as np
 
@@ -103,8 +104,8 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
     """
-    if not 2 <= samples <= _MOST_SAMPLES:
-        raise InputError(f"samples = {samples}: must be from 2 to {_MOST_SAMPLES}")
+    if isinstance(samples, bool) or not isinstance(samples, Integral) or not 2 <= samples <= _MOST_SAMPLES:
+        raise InputError(f"samples = {samples!r}: must be a whole number from 2 to {_MOST_SAMPLES}")
     found = []
     for i, branch in enumerate(curve.branches):
 

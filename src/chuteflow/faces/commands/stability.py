@@ -42,6 +42,7 @@ _VERDICTS = {True: "stable", False: "unstable", None: "?"}
 @options.search_options
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @options.option("--plot", metavar="FILE", help="Draw the modes into FILE: .png, .pdf or .svg.")
+@options.option("--budget", metavar="FILE", help="Draw the energy budgets of the modes into FILE: .png, .pdf or .svg.")
 @options.option("--save", metavar="FILE", help="Write everything to FILE: .csv, or .json with the fields of the modes.")
 def command(as_json: bool, **given: Any) -> None:
     """Solve, search, print, save and draw."""
@@ -52,7 +53,7 @@ def command(as_json: bool, **given: Any) -> None:
     count = 1 if given["count"] is None else given["count"]
     if not 1 <= count <= _MOST:
         raise InputError(f"--modes {count}: must be from 1 to {_MOST}")
-    for name, suffixes in (("save", _SAVED), ("plot", options.DRAWN)):
+    for name, suffixes in (("save", _SAVED), ("plot", options.DRAWN), ("budget", options.DRAWN)):
         if given[name] is not None:
             require_writable(given[name], suffixes)
     from chuteflow.analysis.enumeration import flows
@@ -63,11 +64,13 @@ def command(as_json: bool, **given: Any) -> None:
     answers = [_answer(flow, given["kx"], given["ky"], count) for flow in found]
     if given["save"] is not None:
         _save(found, answers, given["save"])
-    if given["plot"] is not None:
+    if given["plot"] is not None or given["budget"] is not None:
         from chuteflow.faces.plots import write_figure
-        from chuteflow.faces.stability_plot import plot_modes
+        from chuteflow.faces.stability_plot import plot_budgets, plot_modes
 
-        write_figure(plot_modes(found, answers), given["plot"])
+        for name, draw in (("plot", plot_modes), ("budget", plot_budgets)):
+            if given[name] is not None:
+                write_figure(draw(found, answers), given[name])
     if as_json:
         from chuteflow.faces import contract, stability_records
 
@@ -119,6 +122,8 @@ def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:
         yield ""
         for i, answer in enumerate(answers, 1):
             yield f"{i}  {words.among(answer.flow, found)}: {_said(answer)}"
+            if answer.modes:
+                yield f"   {_fed(answer.modes[0])}"
     yield words.searched(found.searched, found.chute, None)
 
 
@@ -140,6 +145,17 @@ def _said(answer: Answer) -> str:
         return f"not known: {answer.reason}"
     found = answer.found
     return _of_all(found) if found.complete else _of_some(found)
+
+
+def _fed(mode: Mode) -> str:
+    """What feeds a mode and what it loses most by, of its energy budget."""
+    from chuteflow.faces.tables import number
+    from chuteflow.stability.budget import energy_budget
+
+    budget = energy_budget(mode)
+    terms = sorted(budget.terms, key=lambda term: -term.total)
+    told = ", ".join(f"{term.name} {number(term.total)}" for term in (*terms[:2], *terms[-2:]))
+    return f"energy of the mode: {told}, of a growth rate of {number(mode.growth)}; closes to {abs(budget.closure):.0e}"
 
 
 def _of_all(found: Stability) -> str:
