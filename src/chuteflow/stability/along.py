@@ -16,6 +16,7 @@ import numpy as np
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability.family import flow_between
+from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import EDGE, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, scanned
 from chuteflow.stability.verdict import RANGE, Stability, stability_of
@@ -179,7 +180,7 @@ def _between(branch: Branch, inner: Sample, outer: Sample) -> Change:
 def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
     """The neutral point between the place of a stable flow and one that grows slowly; None where none is reached."""
     found = outer.found
-    if found is None or found.mode is None or found.mode.growth > _SLOW * found.smallest_rate:
+    if found is None or found.mode is None or found.mode.growth > _SLOW * smallest_rate(outer.flow):
         return None
     mode = found.mode
     k = float(np.hypot(mode.kx, mode.ky)) * outer.flow.centre_of_mass
