@@ -2,6 +2,7 @@
 
 import json
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,15 +72,16 @@ def test_what_is_not_known_is_hatched_and_nothing_else():
     told = np.array([[0.1, 0.2, -0.1], [0.2, np.nan, -0.1], [0.1, 0.1, -0.2]])
     flow = SimpleNamespace(chute=Chute(0.3, 0.8, 0.8, 0.6), mass_flux=3.0, centre_of_mass=2.0)
     axis = np.array([0.0, 0.1, 0.2])
-    for growth in (told, np.nan_to_num(told), np.full((3, 3), np.nan)):
-        mapped = SimpleNamespace(
-            flow=flow, kx=axis, ky=axis, growth=growth, grows=growth > 0.0, unresolved=np.isnan(growth), neutral=()
+    for rates in (told, np.nan_to_num(told), np.full((3, 3), np.nan)):
+        unknown = np.isnan(rates)
+        mapped: Any = SimpleNamespace(
+            flow=flow, kx=axis, ky=axis, growth=rates, grows=rates > 0.0, unresolved=unknown, neutral=()
         )
         figure = plot_wave_map(mapped)
         hatches = [patch.get_hatch() for patch in figure.axes[0].patches]
-        assert hatches == (["////"] if np.isnan(growth).any() else [])
+        assert hatches == (["////"] if unknown.any() else [])
         # All shades lie within what is told: none is made up for the rest.
-        assert ("hatched" in figure.get_suptitle()) == np.isnan(growth).any()
+        assert ("hatched" in figure.get_suptitle()) == unknown.any()
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The fastest growing wave of a flow by brute force: the eigenvalues at all points of a fine map over ln k and direction.
+"""The fastest growing wave of a flow by brute force: all eigenvalues at all points of a map over ln k and direction.
 
 The map takes all eigenvalues of a small grid at each point, with no mode followed from one to the next, and then
 checks the points in the order of what grows there, on the grids of the search. The peak is climbed by Nelder and
@@ -45,7 +45,8 @@ class Peak:
 def highest(flow: chuteflow.Flow, points: int = 60, directions: int = 60) -> Peak | None:
     """The highest peak of a map; None where nothing grows at any of its points."""
     disturbances = Disturbances(flow)
-    logs = np.linspace(*np.log(wavenumbers(flow)), points)
+    low, high = np.log(wavenumbers(flow))
+    logs = np.linspace(low, high, points)
     angles = np.linspace(0.0, 0.5 * np.pi, directions)
     degree = _degree(disturbances, logs)
     grids: dict[Resolution, Operator] = {}
@@ -78,9 +79,7 @@ def _wave(log_k: float, angle: float) -> tuple[float, float]:
     return 0.0 if kx < 1e-9 * k else kx, 0.0 if ky < 1e-9 * k else ky
 
 
-def _largest(
-    disturbances: Disturbances, grids: dict[Resolution, Operator], degree: int, kx: float, ky: float
-) -> float:
+def _largest(disturbances: Disturbances, grids: dict[Resolution, Operator], degree: int, kx: float, ky: float) -> float:
     """The largest growth of all eigenvalues of a grid of ``degree``, with the reach and map of the search's."""
     usual = disturbances.coarse_operator(kx, ky).base.resolution
     resolution = Resolution(max(degree, round(usual.degree * degree / 32)), usual.reach, usual.beta)
@@ -129,9 +128,12 @@ def _climbed(
         return -found[0].growth if found else 0.0
 
     start = np.array(place)
-    simplex = np.array([start, start + [step, 0.0], start + [0.0, step if place[1] < 0.8 else -step]])
+    simplex = start + np.array([[0.0, 0.0], [step, 0.0], [0.0, step if place[1] < 0.8 else -step]])
     end = minimize(
-        fall, start, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 3e-3, "fatol": 1e-12, "maxfev": 80}
+        fall,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 3e-3, "fatol": 1e-12, "maxfev": 80},
     )
     return -float(end.fun), within(end.x)
 
@@ -163,8 +165,8 @@ def campaign(random: int, corner: int, seed: int = 12) -> Iterator[tuple[tuple[f
                 if kind == "random"
                 else ((0.5, 0.58, 0.4, 0.78, 0.7), (0.6, 0.7, 0.55, 0.866, 1.2))
             )
-            *numbers, warmth = (round(float(x), 3) for x in rng.uniform(low, high))
-            found = chuteflow.flows(chuteflow.Chute(*numbers), T_surface=10.0**warmth)
+            slope, e, ew, roughness, warmth = (round(float(x), 3) for x in rng.uniform(low, high))
+            found = chuteflow.flows(chuteflow.Chute(slope, e, ew, roughness), T_surface=10.0**warmth)
             if len(found):
                 left[kind] -= 1
-                yield tuple(numbers), found[int(rng.integers(len(found)))]
+                yield (slope, e, ew, roughness), found[int(rng.integers(len(found)))]

@@ -1,6 +1,7 @@
 """Stability marked along a curve: by a known verdict, and by the real one."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,8 +65,9 @@ def test_a_verdict_that_is_not_given_is_not_known(curve, monkeypatch):
 
 
 def test_samples_out_of_range_and_surfaces_that_cannot_be_posed_are_refused(curve):
-    for samples in (1, "20", 2.5):
-        with pytest.raises(InputError, match="samples = .*must be a whole number"):
+    refused: list[Any] = [1, "20", 2.5]
+    for samples in refused:
+        with pytest.raises(InputError, match=r"samples = .*must be a whole number"):
             along.marked(curve, samples=samples)
     interface = chuteflow.curve(
         chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface="interface"), points=8, surface_temperature=(1.0, 5.0)
@@ -94,8 +96,8 @@ def test_the_family_of_the_paper_is_stable_in_its_middle_alone(curve):
     # On both sides of each, the verdict is the one told
     for flow in changes:
         T = flow.surface_temperature
-        verdicts = [stability_of(chuteflow.flows(PAPER, T_surface=share * T)[0]).stable for share in (0.93, 1.07)]
-        assert sorted(verdicts) == [False, True]
+        verdicts = {stability_of(chuteflow.flows(PAPER, T_surface=share * T)[0]).stable for share in (0.93, 1.07)}
+        assert verdicts == {False, True}
     # Each end is a neutral point: of waves across in hot flows, along in cold ones.
     assert [change.flow.surface_temperature for change in branch.changes] == pytest.approx([1.92236, 1.00689], abs=2e-5)
     assert all(change.neutral and change.error < 1e-4 for change in branch.changes)

@@ -39,9 +39,7 @@ def test_a_budget_adds_up_to_the_growth_of_the_eigenvalue(disturbances, name, kx
 
 
 def test_the_closure_shrinks_with_the_grid(disturbances):
-    closures = [
-        abs(energy_budget(disturbances["C"].accepted(0.0111, 0.0, level)[0][0]).closure) for level in (0, 1, 2)
-    ]
+    closures = [abs(energy_budget(disturbances["C"].accepted(0.0111, 0.0, level)[0][0]).closure) for level in (0, 1, 2)]
     assert closures[0] > 10.0 * closures[1] > 100.0 * closures[2]
 
 

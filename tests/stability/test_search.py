@@ -70,9 +70,7 @@ def test_the_derivatives_of_an_eigenvalue_are_those_of_differences(disturbances)
     pair = refined_pair(of.matrix(kx, ky), of.weights, mode.sigma)
     exact = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
     for i, (x, y) in enumerate(((step, 0.0), (0.0, step))):
-        ahead, behind = (
-            refined(of.matrix(kx + s * x, ky + s * y), of.weights, pair.value)[0] for s in (1.0, -1.0)
-        )
+        ahead, behind = (refined(of.matrix(kx + s * x, ky + s * y), of.weights, pair.value)[0] for s in (1.0, -1.0))
         assert exact[i] == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 

@@ -73,7 +73,9 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
             for i, part in enumerate(("kinetic", "density", "thermal")):
                 label = part if sign > 0.0 else None
                 ax.barh(places, parts[:, i], left=left[:, i], height=0.6, color=style.stroke(i + 1).colour, label=label)
-        ax.plot(rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total")
+        ax.plot(
+            rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total"
+        )
         ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
         ax.axvline(budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
         ax.set_yticks(places, names)

@@ -7,17 +7,17 @@ The energy is the quadratic form of Chu (1965), with this law's pressure p(nu, T
 
     2 E = < nu (|u|^2 + |v|^2 + |w|^2) + nu dp/dnu |n|^2 + (3/2) nu T |tau|^2 >
 
-Each linearised equation is multiplied by the conjugate of its field, with these weights, and integrated; the real part of
-the sum is Re(sigma) 2 E. In this norm the work of the pressure passes energy between its three parts and adds up
-to nothing, so that what is left are the sources. Advection by U drops out. Stresses and heat flux are integrated by
+Each linearised equation is multiplied by the conjugate of its field, with these weights, and integrated; the real
+part of the sum is Re(sigma) 2 E. In this norm the work of the pressure passes energy between its three parts and adds
+up to nothing, so that what is left are the sources. Advection by U drops out. Stresses and heat flux are integrated by
 parts, which gives the terms of the base. All terms are divided by 2 E: they are rates, and add up to the growth rate.
 What is left over, the closure, comes from quadrature and from the grains above the grid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from chuteflow.numerics.first_order import FirstOrder, exp
 from chuteflow.stability.base import Base
 from chuteflow.stability.linear import ACROSS, ALONG, DENSITY, HEAT, UP, grains
 from chuteflow.stability.modes import Mode, relative_fields
-from chuteflow.theory.transport import AXES, Fields, Motion, Vector, closures, motion
+from chuteflow.theory.transport import AXES, Fields, Grains, Motion, Vector, closures, motion
 
 #: Names of the terms, and what they are.
 TERMS = {
@@ -100,7 +100,7 @@ class _Disturbed:
     kx: float
     ky: float
     n: Complex
-    velocity: Sequence[Complex]
+    velocity: Complex
     tau: Complex
     moving: Motion
     pressure: FirstOrder
@@ -143,89 +143,117 @@ class _Disturbed:
             stiffness=_stiffness(base, law),
         )
 
-    def integral(self, integrand: Complex) -> float:
-        """Re < integrand > over twice the energy."""
-        return float(np.real(self.base.weights @ integrand)) / sum(self.energies)
-
     @property
     def energies(self) -> tuple[float, float, float]:
         """Twice the kinetic, density and thermal energy."""
         profile = self.base.profile
-        nu, T = profile.volume_fraction, profile.granular_temperature
         parts = (
-            nu * sum(np.abs(component) ** 2 for component in self.velocity),
+            profile.volume_fraction * (np.abs(self.velocity) ** 2).sum(axis=0),
             self.stiffness * np.abs(self.n) ** 2,
-            1.5 * nu * T * np.abs(self.tau) ** 2,
+            1.5 * profile.volume_fraction * profile.granular_temperature * np.abs(self.tau) ** 2,
         )
         kinetic, density, thermal = (float(self.base.weights @ part) for part in parts)
         return kinetic, density, thermal
 
-    def gradient(self, field: Complex) -> tuple[Complex, Complex, Complex]:
-        """The gradient of a disturbance."""
-        return 1j * self.kx * field, 1j * self.ky * field, self.base.derivative @ field
+    def rate(self, integrand: Complex) -> float:
+        """Re < integrand > over twice the energy."""
+        return float(np.real(self.base.weights @ integrand)) / sum(self.energies)
 
-    @property
+    def gradient(self, field: Complex) -> Complex:
+        """The gradient of a disturbance, (3, n)."""
+        return np.array([1j * self.kx * field, 1j * self.ky * field, self.base.derivative @ field])
+
+    @cached_property
+    def strain(self) -> Complex:
+        """d u_i/d x_j of the disturbed velocity, (3, 3, n)."""
+        return np.array([self.gradient(component) for component in self.velocity])
+
+    @cached_property
     def divergence(self) -> Complex:
         """Divergence of the disturbed velocity."""
-        return sum((self.gradient(self.velocity[i])[i] for i in AXES), np.zeros(self.base.points, dtype=complex))
+        return np.einsum("iin->n", self.strain)
+
+    @cached_property
+    def viscous_stress(self) -> Complex:
+        """S' (3, 3, n)."""
+        stress: Complex = np.array([[self.moving.pressure[i][j].slope[:, 0] for j in AXES] for i in AXES])
+        for i in AXES:
+            stress[i, i] -= self.pressure.slope[:, 0]
+        return stress
+
+    @cached_property
+    def heat_flux(self) -> Complex:
+        """q' (3, n)."""
+        return np.array([component.slope[:, 0] for component in self.moving.heat_flux])
+
+    @cached_property
+    def shear(self) -> Array:
+        """dU/dz."""
+        return self.base.derivative @ self.base.profile.velocity
 
 
-def _stiffness(base: Base, law: object) -> Array:
+def _stiffness(base: Base, law: Grains) -> Array:
     """nu dp/dnu at constant T."""
     nu, T = base.profile.volume_fraction, base.profile.granular_temperature
-    number = FirstOrder(nu, np.ones((len(nu), 1)))
-    g1 = closures(law, number)[1]  # pyright: ignore[reportArgumentType]
+    g1 = closures(law, FirstOrder(nu, np.ones((len(nu), 1))))[1]
     return nu * T * np.real(g1.slope[:, 0])
 
 
 def _terms(at: _Disturbed) -> list[Term]:
     """All terms, in the order of TERMS."""
-    base, profile = at.base, at.base.profile
-    nu, T, p = profile.volume_fraction, profile.granular_temperature, at.pressure.value
+    return [*_kinetic(at), *_thermal(at), *_exchanged(at), *_at_the_ends(at)]
+
+
+def _kinetic(at: _Disturbed) -> list[Term]:
     u, _, w = at.velocity
-    across = at.velocity[ACROSS - ALONG]
-    shear = base.derivative @ profile.velocity
-    p_ = at.pressure.slope[:, 0]
-    S = [[at.moving.pressure[i][j].slope[:, 0] - (p_ if i == j else 0.0) for j in AXES] for i in AXES]
-    grads = [at.gradient(component) for component in at.velocity]
-    q = [at.moving.heat_flux[i].slope[:, 0] for i in AXES]
-    eta, eta_ = at.viscosity.value, at.viscosity.slope[:, 0]
-    heating = eta_ * shear**2 + 2.0 * eta * shear * (grads[0][2] + grads[2][0])
-    slope = base.flow.chute.slope
-    grad_p = at.gradient(p_)
-    grad_tau = at.gradient(at.tau)
-
-    def rate(integrand: Complex) -> float:
-        return at.integral(integrand)
-
-    def end(node: int, sign: float) -> tuple[float, float]:
-        """The fluxes of kinetic and thermal energy through an end."""
-        work = sum(np.conj(at.velocity[i][node]) * S[i][2][node] for i in AXES)
-        heat = np.conj(at.tau[node]) * q[2][node]
-        size = sum(at.energies)
-        return sign * float(np.real(work)) / size, sign * float(np.real(heat)) / size
-
-    (base_work, base_heat), (top_work, top_heat) = end(-1, 1.0), end(0, -1.0)
-    star = np.conj(at.tau)
+    work = (at.viscous_stress * at.strain.conj()).sum(axis=(0, 1))
     return [
-        Term("shear production", kinetic=rate(-nu * w * shear * u.conj())),
-        Term("viscous stress", kinetic=rate(sum(S[i][j] * grads[i][j].conj() for i in AXES for j in AXES))),
-        Term("shear work", thermal=rate(star * heating)),
-        Term("collisional loss by density", thermal=rate(-star * at.loss_by_density)),
-        Term("collisional loss by temperature", thermal=rate(-star * at.loss_by_temperature)),
-        Term("conduction", thermal=rate(sum(q[i] * grad_tau[i].conj() for i in AXES))),
+        Term("shear production", kinetic=at.rate(-at.base.profile.volume_fraction * w * at.shear * u.conj())),
+        Term("viscous stress", kinetic=at.rate(work)),
+    ]
+
+
+def _thermal(at: _Disturbed) -> list[Term]:
+    star, shear = at.tau.conj(), at.shear
+    heating = at.viscosity.slope[:, 0] * shear**2
+    heating = heating + 2.0 * at.viscosity.value * shear * (at.strain[0, 2] + at.strain[2, 0])
+    return [
+        Term("shear work", thermal=at.rate(star * heating)),
+        Term("collisional loss by density", thermal=at.rate(-star * at.loss_by_density)),
+        Term("collisional loss by temperature", thermal=at.rate(-star * at.loss_by_temperature)),
+        Term("conduction", thermal=at.rate((at.heat_flux * at.gradient(at.tau).conj()).sum(axis=0))),
+    ]
+
+
+def _exchanged(at: _Disturbed) -> list[Term]:
+    """What the pressure passes on, and what comes from the fields and the weight of the steady flow."""
+    profile, d_dz = at.base.profile, at.base.derivative
+    nu, T = profile.volume_fraction, profile.granular_temperature
+    u, _, w = at.velocity
+    slope, n_star, star = at.base.flow.chute.slope, at.n.conj(), at.tau.conj()
+    push = (at.velocity.conj() * at.gradient(at.pressure.slope[:, 0])).sum(axis=0)
+    return [
         Term(
             "pressure work",
-            kinetic=rate(-(u.conj() * grad_p[0] + across.conj() * grad_p[1] + w.conj() * grad_p[2])),
-            density=rate(-at.stiffness * at.n.conj() * at.divergence),
-            thermal=rate(-p * star * at.divergence),
+            kinetic=at.rate(-push),
+            density=at.rate(-at.stiffness * n_star * at.divergence),
+            thermal=at.rate(-at.pressure.value * star * at.divergence),
         ),
         Term(
             "stratification",
-            density=rate(-at.stiffness * at.n.conj() * w * (base.derivative @ np.log(nu))),
-            thermal=rate(-1.5 * nu * T * star * w * (base.derivative @ np.log(T))),
+            density=at.rate(-at.stiffness * n_star * w * (d_dz @ np.log(nu))),
+            thermal=at.rate(-1.5 * nu * T * star * w * (d_dz @ np.log(T))),
         ),
-        Term("gravity", kinetic=rate(nu * at.n * (slope * u.conj() - w.conj()))),
-        Term("base", kinetic=base_work, thermal=base_heat),
-        Term("above", kinetic=top_work, thermal=top_heat),
+        Term("gravity", kinetic=at.rate(nu * at.n * (slope * u.conj() - w.conj()))),
     ]
+
+
+def _at_the_ends(at: _Disturbed) -> list[Term]:
+    size = sum(at.energies)
+
+    def passed(name: str, node: int, sign: float) -> Term:
+        work = at.velocity[:, node].conj() @ at.viscous_stress[:, 2, node]
+        heat = at.tau[node].conj() * at.heat_flux[2, node]
+        return Term(name, kinetic=sign * float(work.real) / size, thermal=sign * float(heat.real) / size)
+
+    return [passed("base", -1, 1.0), passed("above", 0, -1.0)]

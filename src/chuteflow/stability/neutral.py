@@ -106,7 +106,9 @@ def _lines(scan: Scan) -> list[Array]:
     seen = np.isfinite(growth)
     level = growth if seen.all() else np.where(seen, growth, -0.1 * np.nanmax(np.abs(growth), initial=1e-300))
     # Nothing is crossed where it is not known what grows: lines end there, and curves are followed through.
-    lines = contour_generator(scan.a, scan.b, np.ma.array(level, mask=np.broadcast_to(scan.unresolved, level.shape)).T).lines(0.0)
+    lines = contour_generator(
+        scan.a, scan.b, np.ma.array(level, mask=np.broadcast_to(scan.unresolved, level.shape)).T
+    ).lines(0.0)
     return sorted((np.asarray(line) for line in lines), key=len, reverse=True)
 
 

@@ -288,5 +288,8 @@ def _both(name: str, given: object) -> tuple[float, float]:
     """
     if isinstance(given, Sequence) and not isinstance(given, str) and len(given) == 2 and all(map(_is_number, given)):
         return given[0], given[1]
-    raise InputError(f"{name} = {given!r}: must be two numbers, such as (0.0, 0.1)" if name != "size" else
-                     f"size = {given!r}: must be two whole numbers, such as (40, 40)")
+    raise InputError(
+        f"{name} = {given!r}: must be two numbers, such as (0.0, 0.1)"
+        if name != "size"
+        else f"size = {given!r}: must be two whole numbers, such as (40, 40)"
+    )

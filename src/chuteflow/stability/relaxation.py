@@ -43,8 +43,8 @@ class Outcome:
     ``nearest`` its index; ``rate`` is that at which the logarithm of the distance changed in the last fifth of the
     time: negative where the flow approaches. At late times that is no rate of a mode: what is left then belongs to the
     continuous spectrum, which touches zero, and its slowest part on the grid of the integration depends on the grid.
-    ``leading`` is the growth rate of the leading discrete mode of the nearest flow that is the same all along the chute,
-    the mass mode set apart; None where none is told.
+    ``leading`` is the growth rate of the leading discrete mode of the nearest flow that is the same all along the
+    chute, the mass mode set apart; None where none is told.
     """
 
     steady: tuple[Flow, ...]

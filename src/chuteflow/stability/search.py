@@ -17,13 +17,22 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex, Eigenpair, refined_pair
 from chuteflow.stability.linear import Operator
-from chuteflow.stability.modes import DEGREES, TOLERANCE, Disturbances, Mode, UnresolvedError, check_wavenumbers, leading
+from chuteflow.stability.modes import (
+    DEGREES,
+    TOLERANCE,
+    Disturbances,
+    Mode,
+    UnresolvedError,
+    check_wavenumbers,
+    leading,
+)
 
 #: Points of the scan: wavenumbers, and angles in degrees.
 SCAN, ANGLES = 14, (0.0, 15.0, 30.0, 60.0, 75.0, 82.5, 86.25, 90.0)
@@ -149,7 +158,9 @@ class _Search:
         """d(kx, ky)/d ln k and d(kx, ky)/d angle, (2, 2), of what is free."""
         if self.free:
             return np.array([[kx, ky], [-ky, kx]])
-        return np.array([[0.0 if self.fixed[0] is not None else kx, ky if self.fixed[0] is not None else 0.0], [0.0, 0.0]])
+        return np.array(
+            [[0.0 if self.fixed[0] is not None else kx, ky if self.fixed[0] is not None else 0.0], [0.0, 0.0]]
+        )
 
     def _take_uniform(self) -> None:
         """The leading disturbance that is the same all along the chute, but for the mass mode."""
@@ -243,7 +254,7 @@ class _Search:
         self._certify(_Climb(self, start, mode.operator).summit(start, turning=turning))
 
     def _ascended(self, start: _Place) -> list[_Place]:
-        """The summits that a mode leads to from ``start``: from an axis that along it, and one aside if it is higher."""
+        """The summits that a mode leads to: from an axis that along it, and one aside if it is higher there."""
         climb = _Climb(self, start)
         if not self.free or min(start.angle, 0.5 * np.pi - start.angle) > _ALIGNED:
             return [climb.summit(start, turning=self.free)]
@@ -307,7 +318,7 @@ class _Climb:
         units = np.array([1.0, _UNIT])[: 2 if turning else 1]
         best = self.at(start.log_k, start.angle) or start
 
-        def fall(x: Array) -> tuple[float, Array]:
+        def fall(x: Array) -> tuple[float, Any]:
             nonlocal best
             there = self.at(float(x[0]), float(x[1] * _UNIT) if turning else start.angle)
             if there is None or there.slope is None:
@@ -318,7 +329,7 @@ class _Climb:
 
         limits = [self.search.bounds, (0.0, 0.5 * np.pi / _UNIT)][: len(units)]
         begin = np.array([start.log_k, start.angle / _UNIT])[: len(units)]
-        options = {"maxfun": _EVALUATIONS, "ftol": 1e-8, "gtol": 1e-4}
+        options: Any = {"maxfun": _EVALUATIONS, "ftol": 1e-8, "gtol": 1e-4}
         with suppress(_LostError):  # a mode that ends on the way was highest at its best place so far
             minimize(fall, begin, jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return best

@@ -161,4 +161,5 @@ def growth_map(disturbances: Disturbances, kx: Array, ky: Array) -> GrowthMap:
                 continue
             if found:
                 out[:, i, j] = found[0].growth, found[0].frequency, found[0].error
-    return GrowthMap(disturbances.flow, kx, ky, *out, unresolved)
+    growth, frequency, error = out
+    return GrowthMap(disturbances.flow, kx, ky, growth, frequency, error, unresolved)

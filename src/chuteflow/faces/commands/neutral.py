@@ -106,9 +106,11 @@ def _without(found: FamilyMap) -> str:
     known = "all waves of this range" if not found.unresolved.any() else "all waves of this range that are known"
     if found.grows.all(where=~found.unresolved):
         return f"{known} grow"
-    return f"none is followed between the {int(found.grows.sum())} points that grow and the others" if (
-        found.grows.any()
-    ) else f"{known} decay"
+    return (
+        f"none is followed between the {int(found.grows.sum())} points that grow and the others"
+        if (found.grows.any())
+        else f"{known} decay"
+    )
 
 
 def _place(flow: Flow) -> str:

@@ -162,8 +162,8 @@ def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
     pace = f"the distance changed at the rate {number(end.rate)} in the last fifth of the time"
     if end.leading is not None:
         pace += (
-            f" (the leading discrete mode of that flow has the rate {number(end.leading)}; what is slower belongs to the "
-            "continuous spectrum and depends on the grid)"
+            f" (the leading discrete mode of that flow has the rate {number(end.leading)}; what is slower "
+            "belongs to the continuous spectrum and depends on the grid)"
         )
     if end.distance < _ARRIVED and end.rate < 0.0:
         return f"it comes to {name}: {away} at t = {number(last.time)}, and {pace}"

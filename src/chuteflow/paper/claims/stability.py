@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from chuteflow import Chute, Flow, Stability, flows, stability_of
-from chuteflow.stability.budget import Budget, energy_budget
 from chuteflow.paper.claims.registry import Finding, claim, decide
 from chuteflow.paper.claims.shared import SLOPE, named_flows
 from chuteflow.paper.materials import dissipative
+from chuteflow.stability.budget import Budget, energy_budget
 
 #: Surface temperatures of the family of figure 3 that stand for it beside flows A and C, hot to cold.
 _WARMTH = (20.0, 1.7, 1.2, 0.5)
@@ -157,6 +157,6 @@ def inelastic_clustering() -> Finding:
         # The terms are integrals over the mode; they add up to its eigenvalue, which they know nothing of.
         corrected=clusters >= {"flow A", "flow C", "a steep flow"}
         and all(abs(budget.closure) < 1e-3 * budget.mode.growth for budget in budgets.values()),
-        correction="It is so for a mode of each kind, along, across and oblique, in long waves. It is not so everywhere: "
-        "gravity feeds some waves along steep chutes, and the shear of the flow feeds short waves.",
+        correction="It is so for a mode of each kind, along, across and oblique, in long waves. It is not so "
+        "everywhere: gravity feeds some waves along steep chutes, and the shear of the flow feeds short waves.",
     )
