@@ -66,7 +66,7 @@ def budget_object(budget: Budget) -> dict[str, Any]:
         "closure": finite(budget.closure),
         "shares": dict(zip(("kinetic", "density", "thermal"), map(finite, budget.shares), strict=True)),
         "terms": {
-            term.name: {
+            term.name.replace(" ", "_"): {
                 "kinetic": finite(term.kinetic),
                 "density": finite(term.density),
                 "thermal": finite(term.thermal),
