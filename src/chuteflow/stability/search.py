@@ -44,7 +44,8 @@ _STEP = 0.15
 _SHORTEST, _LIKENESS = 5e-3, 0.5
 #: A unit of the climber is this angle: ridges are narrow in it.
 _UNIT = 0.25
-#: Evaluations of a climb.
+#: Slopes at which climbs end, over their rates; and evaluations of a climb.
+_ROUGH, _EXACT = 1e-4, 1e-7
 _EVALUATIONS = 30
 #: Angles aside of a wave along or across at which it is seen whether it is a maximum; below the last it is one.
 _ASIDE, _ALIGNED = np.radians((1.5, 4.0)), np.radians(0.2)
@@ -113,8 +114,6 @@ class _Search:
         self.free = fixed == (None, None)
         self.bounds = (float(np.log(searched[0])), float(np.log(searched[1])))
         self.best: Mode | None = None
-        #: How much the growth of the best differs from that on the grid of its climb.
-        self.change = 0.0
         self.unresolved: list[tuple[float, float]] = []
 
     def run(self) -> Fastest:
@@ -128,8 +127,7 @@ class _Search:
         self._settle(logs, angles, np.real(sheets[0]))
         if self.best is None or self.best.growth < 0.0:
             self._take_longest()
-        elif self.change > _GAIN * self.best.growth:
-            self._polish()
+        self._polish()
         return Fastest(self.best, tuple(dict.fromkeys(self.unresolved)), sheets[0].size)
 
     def _scanned(self, logs: Array, angles: Array) -> Complex:
@@ -176,12 +174,9 @@ class _Search:
         for angle in (0.0, 0.5 * np.pi) if self.free else (0.0,):
             self._take(self._known(_Place(self.bounds[0], angle, 0j)))
 
-    def _take(self, mode: Mode | None) -> bool:
-        """Whether ``mode`` is the best so far; it is kept then."""
-        better = mode is not None and (self.best is None or mode.growth > self.best.growth)
-        if better:
+    def _take(self, mode: Mode | None) -> None:
+        if mode is not None and (self.best is None or mode.growth > self.best.growth):
             self.best = mode
-        return better
 
     def _summits(self, starts: list[_Place]) -> list[_Place]:
         """Where the climbs end, highest first, each once."""
@@ -203,8 +198,7 @@ class _Search:
         """Take the leading mode at a summit; where another one leads there, climb on by that."""
         for _ in range(_ANEW):
             mode = self._known(summit)
-            if self._take(mode) and mode is not None:
-                self.change = abs(mode.growth - summit.sigma.real)
+            self._take(mode)
             if mode is None or mode.growth < summit.sigma.real + _GAIN * abs(summit.sigma.real):
                 return
             summit = self._ascended(_Place(summit.log_k, summit.angle, mode.sigma))[-1]
@@ -242,7 +236,7 @@ class _Search:
                     self._certify(summit)
 
     def _polish(self) -> None:
-        """Climb once more on the grid that the best mode was computed on."""
+        """Climb once more to rounding, on the grid that the best mode was computed on."""
         mode = self.best
         if mode is None or mode.direction == "uniform":
             return
@@ -251,7 +245,11 @@ class _Search:
             k, angle = mode.ky if self.fixed[1] is None else mode.kx, 0.0
         start = _Place(float(np.log(k)), angle, mode.sigma)
         turning = self.free and min(angle, 0.5 * np.pi - angle) > _ALIGNED
-        self._certify(_Climb(self, start, mode.operator).summit(start, turning=turning))
+        summit = _Climb(self, start, mode.operator).summit(start, turning=turning, accuracy=_EXACT)
+        polished = self._known(summit)
+        # Near the summit rates differ by less than their errors: the summit is where the slope vanishes.
+        if polished is not None and polished.growth > mode.growth - max(mode.error, polished.error):
+            self.best = polished
 
     def _ascended(self, start: _Place) -> list[_Place]:
         """The summits that a mode leads to: from an axis that along it, and one aside if it is higher there."""
@@ -310,8 +308,11 @@ class _Climb:
         by_k = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
         return _Place(log_k, angle, pair.value, pair, self.search.directions(kx, ky) @ by_k)
 
-    def summit(self, start: _Place, *, turning: bool) -> _Place:
-        """The local maximum of the rate uphill from ``start``, at its angle unless ``turning``."""
+    def summit(self, start: _Place, *, turning: bool, accuracy: float = _ROUGH) -> _Place:
+        """The local maximum of the rate uphill from ``start``, at its angle unless ``turning``.
+
+        Its slope, over the rate at the start, is below ``accuracy``.
+        """
         from scipy.optimize import minimize
 
         scale = max(abs(start.sigma.real), self.search.disturbances.smallest_rate)
@@ -323,13 +324,13 @@ class _Climb:
             there = self.at(float(x[0]), float(x[1] * _UNIT) if turning else start.angle)
             if there is None or there.slope is None:
                 raise _LostError
-            if there.sigma.real > best.sigma.real:
+            if there.sigma.real >= best.sigma.real:
                 best = there
             return -there.sigma.real / scale, -np.real(there.slope[: len(x)]) * units / scale
 
         limits = [self.search.bounds, (0.0, 0.5 * np.pi / _UNIT)][: len(units)]
         begin = np.array([start.log_k, start.angle / _UNIT])[: len(units)]
-        options: Any = {"maxfun": _EVALUATIONS, "ftol": 1e-8, "gtol": 1e-4}
+        options: Any = {"maxfun": _EVALUATIONS, "ftol": accuracy**2, "gtol": accuracy}
         with suppress(_LostError):  # a mode that ends on the way was highest at its best place so far
             minimize(fall, begin, jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return best
