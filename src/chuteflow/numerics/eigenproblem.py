@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
 
 from chuteflow.numerics.chebyshev import Array
 
@@ -149,8 +150,6 @@ class _Factors:
 
     @classmethod
     def of(cls, matrix: Complex, weights: Array, near: complex) -> _Factors:
-        from scipy.linalg import lu_factor
-
         shifted = matrix.astype(complex)
         # Off the eigenvalue by more than rounding, so that the factors are regular.
         shift = near + 1e-9 * (1.0 + abs(near))
@@ -159,8 +158,6 @@ class _Factors:
         return cls(shift, weights, size, lu_factor(shifted / size[:, None], check_finite=False))
 
     def iterated(self, steps: int, start: Complex | None = None) -> tuple[complex, Complex]:
-        from scipy.linalg import lu_solve
-
         right = self.weights / self.size
         live = self.weights != 0.0
         vector = np.exp(1j * np.arange(len(self.weights))) if start is None else start
@@ -175,8 +172,6 @@ class _Factors:
 
     def left(self, right: Complex, steps: int = 4) -> Complex:
         """The left vector, by as many solutions with the conjugate transpose as its direction needs."""
-        from scipy.linalg import lu_solve
-
         vector = right / np.linalg.norm(right)
         for _ in range(steps):
             image = lu_solve(self.factors, self.weights * vector, trans=2, check_finite=False) / self.size

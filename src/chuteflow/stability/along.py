@@ -9,18 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from numbers import Integral
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
-from chuteflow.errors import InputError, SolveError
+from chuteflow.checks import whole
+from chuteflow.errors import SolveError
 from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import EDGE, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, scanned
 from chuteflow.stability.verdict import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
@@ -43,6 +45,9 @@ class Sample:
     flow: Flow
     found: Stability | None
 
+    def __repr__(self) -> str:
+        return display.line("Sample", self.label, repr(self.flow)[1:-1])
+
     @property
     def label(self) -> str:
         """ "stable", the direction of the mode that grows fastest, or "unknown"."""
@@ -59,6 +64,9 @@ class Run:
 
     label: str
     flows: tuple[Flow, ...]
+
+    def __repr__(self) -> str:
+        return display.line("Run", self.label, display.counted(len(self.flows), "flow"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +92,10 @@ class MarkedBranch:
     runs: tuple[Run, ...]
     changes: tuple[Change, ...]
 
+    def __repr__(self) -> str:
+        labels = ", ".join(run.label for run in self.runs)
+        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} judged: {labels}")
+
 
 @dataclass(frozen=True, eq=False)
 class MarkedCurve:
@@ -92,7 +104,13 @@ class MarkedCurve:
     curve: Curve
     branches: tuple[MarkedBranch, ...]
 
+    def __repr__(self) -> str:
+        judged = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
 
+
+@on_one_thread
+@np.errstate(under="ignore")
 def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 
@@ -105,8 +123,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
     """
-    if isinstance(samples, bool) or not isinstance(samples, Integral) or not 2 <= samples <= _MOST_SAMPLES:
-        raise InputError(f"samples = {samples!r}: must be a whole number from 2 to {_MOST_SAMPLES}")
+    samples = whole("samples", samples, 2, _MOST_SAMPLES)
     found = []
     for i, branch in enumerate(curve.branches):
 

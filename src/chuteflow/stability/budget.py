@@ -28,6 +28,7 @@ from chuteflow.stability.base import Base
 from chuteflow.stability.linear import ACROSS, ALONG, DENSITY, HEAT, UP, grains
 from chuteflow.stability.modes import Mode, relative_fields
 from chuteflow.theory.transport import AXES, Fields, Grains, Motion, Vector, closures, motion
+from chuteflow.threads import on_one_thread
 
 #: Names of the terms, and what they are.
 TERMS = {
@@ -82,6 +83,7 @@ class Budget:
         return max(self.terms, key=lambda term: term.total)
 
 
+@on_one_thread
 def energy_budget(mode: Mode) -> Budget:
     """The energy budget of ``mode``, on the grid on which it was computed."""
     at = _Disturbed.of(mode)

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 
 import numpy as np
 
+from chuteflow import display
+from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
@@ -78,6 +79,10 @@ class Mode:
     error: float
     operator: Operator
     vector: Complex
+
+    def __repr__(self) -> str:
+        numbers = {"kx": self.kx, "ky": self.ky, "growth": self.growth, "frequency": self.frequency}
+        return display.line("Mode", self.kind, **numbers, error=self.error)
 
     @property
     def growth(self) -> float:
@@ -323,8 +328,7 @@ def check_wavenumbers(kx: float, ky: float) -> None:
         InputError: where they are no finite numbers in the range that has a meaning.
     """
     for name, k in (("kx", kx), ("ky", ky)):
-        if isinstance(k, bool) or not isinstance(k, Real):
-            raise InputError(f"wavenumber {name} = {k!r}: must be a number (in 1/d), not {type(k).__name__}")
+        k = real(f"wavenumber {name}", k, " (in 1/d)")
         if not (np.isfinite(k) and abs(k) <= _LARGEST):
             raise InputError(f"wavenumber {name} = {k}: must be from -{_LARGEST:g} to {_LARGEST:g} (in 1/d)")
     k = np.hypot(kx, ky)

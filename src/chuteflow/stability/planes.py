@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow import display
+from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.family import flow_between
@@ -21,6 +22,7 @@ from chuteflow.stability.modes import Disturbances, UnresolvedError, check_waven
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
 from chuteflow.stability.verdict import stability_of
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Called with the share of a scan that is done.
 Progress = Callable[[float], None]
@@ -136,6 +138,10 @@ class WaveMap:
     smallest_rate: float
     neutral: tuple[NeutralCurve, ...]
 
+    def __repr__(self) -> str:
+        reach = (display.span("kx", self.kx), display.span("ky", self.ky), display.span("growth", self.growth.flat))
+        return display.line("WaveMap", *reach, display.counted(len(self.neutral), "neutral curve"))
+
 
 @dataclass(frozen=True, eq=False)
 class FamilyMap:
@@ -158,7 +164,14 @@ class FamilyMap:
     neutral: tuple[NeutralCurve, ...]
     neutral_flows: tuple[tuple[Flow, ...], ...]
 
+    def __repr__(self) -> str:
+        reach = (display.span("k h", self.depth_wavenumber), display.span("growth", self.growth.flat))
+        flows, curves = display.counted(len(self.flows), "flow"), display.counted(len(self.neutral), "neutral curve")
+        return display.line("FamilyMap", f"{flows}, waves at {self.angle:g} degrees", *reach, curves)
 
+
+@on_one_thread
+@np.errstate(under="ignore")
 def wave_map(
     flow: Flow,
     *,
@@ -182,7 +195,7 @@ def wave_map(
     _check_size(size)
     for name, ends in (("kx", kx), ("ky", ky)):
         if ends is not None:
-            _check_range(name, *_both(name, ends))
+            _check_range(name, *pair(name, ends))
     usual = _usual(flow) if kx is None or ky is None else 0.0
     ends = [(0.0, usual) if given is None else given for given in (kx, ky)]
     low, unit = [low for low, _ in ends], [high - low for low, high in ends]
@@ -203,6 +216,8 @@ def wave_map(
     )
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def family_map(
     flows: Sequence[Flow],
     *,
@@ -226,9 +241,10 @@ def family_map(
     _check_size(size)
     if len(flows) < 2:
         raise InputError(f"{len(flows)} flow: a family needs at least 2")
-    if not _is_number(angle) or not 0.0 <= angle <= 90.0:
-        raise InputError(f"angle {angle!r}: must be a number from 0 (along the slope) to 90 (across), in degrees")
-    low, high = _both("depth_wavenumber", depth_wavenumber)
+    angle = number("angle", angle)
+    if not 0.0 <= angle <= 90.0:
+        raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
+    low, high = pair("depth_wavenumber", depth_wavenumber)
     if not 0.0 < low < high <= _LARGEST_DEPTH_WAVENUMBER:
         raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
     low, high = np.log((low, high))
@@ -264,9 +280,7 @@ def _usual(flow: Flow) -> float:
 
 
 def _check_size(size: tuple[int, int]) -> None:
-    m, n = _both("size", size)
-    if not all(isinstance(points, Integral) and 4 <= points <= _MOST_POINTS for points in (m, n)):
-        raise InputError(f"size {m}x{n}: must be whole numbers from 4x4 to {_MOST_POINTS}x{_MOST_POINTS}")
+    checked_size(size, 4, _MOST_POINTS)
 
 
 def _check_range(name: str, low: float, high: float) -> None:
@@ -274,22 +288,3 @@ def _check_range(name: str, low: float, high: float) -> None:
         check_wavenumbers(*((k, 0.0) if name == "kx" else (0.0, k)))
     if not low < high:
         raise InputError(f"{name} from {low:g} to {high:g}: the range must rise")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _both(name: str, given: object) -> tuple[float, float]:
-    """Two numbers.
-
-    Raises:
-        InputError: for anything else.
-    """
-    if isinstance(given, Sequence) and not isinstance(given, str) and len(given) == 2 and all(map(_is_number, given)):
-        return given[0], given[1]
-    raise InputError(
-        f"{name} = {given!r}: must be two numbers, such as (0.0, 0.1)"
-        if name != "size"
-        else f"size = {given!r}: must be two whole numbers, such as (40, 40)"
-    )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.modes import (
     TOLERANCE,
@@ -24,6 +25,7 @@ from chuteflow.stability.modes import (
 )
 from chuteflow.stability.search import Fastest, fastest
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 __all__ = [
     "RANGE",
@@ -73,7 +75,21 @@ class Stability:
             return None
         return not self.grows
 
+    def __repr__(self) -> str:
+        verdict = {True: "stable", False: "unstable"}.get(self.stable, "not known")
+        return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
 
+    def _repr_html_(self) -> str:
+        mode = self.mode
+        header = ["", "mode", "kx", "ky", "growth", "frequency", "error"]
+        numbers = [] if mode is None else [mode.kx, mode.ky, mode.growth, mode.frequency, mode.error]
+        cells = ["none"] if mode is None else [mode.kind, *map(display.number, numbers)]
+        verdict = repr(self)[1:-1].split(": ")[1].split("; ")[0]
+        return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
+
+
+@on_one_thread
+@np.errstate(under="ignore")
 def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None) -> Stability:
     """Whether ``flow`` is stable, from a search over wavenumbers; with wavenumbers given, what these waves do.
 
@@ -120,6 +136,8 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
     return RANGE[0] / h, min(RANGE[1], max(_SHORTEST * h, 1.0)) / h
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
     """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
 
@@ -148,6 +166,8 @@ class GrowthMap:
     unresolved: NDArray[np.bool_]
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def growth_map(disturbances: Disturbances, kx: Array, ky: Array) -> GrowthMap:
     """The leading mode at each pair of wavenumbers, about 15 ms for each."""
     out = np.full((3, len(kx), len(ky)), np.nan)
