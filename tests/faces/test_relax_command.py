@@ -134,5 +134,5 @@ def test_an_interruption_leaves_no_file_and_no_traceback(monkeypatch, capsys, tm
 
     monkeypatch.setattr("chuteflow.stability.relaxation.Radau.step", interrupted)
     assert run(f"{PAPER} --flux 3 --save {tmp_path / 'way.csv'}") == 130
-    assert capsys.readouterr().err.strip() == ""
+    assert capsys.readouterr().err.strip() == "chuteflow: interrupted"
     assert not list(tmp_path.iterdir())

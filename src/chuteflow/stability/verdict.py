@@ -76,7 +76,7 @@ class Stability:
         return not self.grows
 
     def __repr__(self) -> str:
-        verdict = {True: "stable", False: "unstable"}.get(self.stable, "not known")
+        verdict = "not known" if self.stable is None else "stable" if self.stable else "unstable"
         return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
 
     def _repr_html_(self) -> str:
