@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from chuteflow import Chute, Flow, SolveError, flows, stability_of
+from chuteflow import Chute, Flow, flows, stability_of
 
 
 def drawn(seed: int, draws: int) -> Iterator[Flow]:
@@ -27,9 +27,8 @@ def drawn(seed: int, draws: int) -> Iterator[Flow]:
 
 def kind(flow: Flow) -> str:
     """ "stable", the direction of what grows fastest, or "unknown"."""
-    try:
-        found = stability_of(flow)
-    except SolveError:
+    found = stability_of(flow)
+    if found.stable is None:
         return "unknown"
     return "stable" if found.stable or found.mode is None else found.mode.direction
 

@@ -1,12 +1,16 @@
 """``chuteflow growth`` and ``chuteflow neutral``: tables, JSON, files, pictures and bad input."""
 
 import json
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from chuteflow import Chute
 from chuteflow.faces.cli import main
 from chuteflow.faces.commands import growth
+from chuteflow.faces.growth_plot import plot_wave_map
 
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
 SMALL = f"growth {PAPER} --flux 3 --kx 0:0.02 --ky 0:0.03 --size 4x5"
@@ -43,6 +47,52 @@ def test_the_report_and_rows_of_csv(capsys, monkeypatch, tmp_path):
     rows = (tmp_path / "map.csv").read_text().splitlines()
     assert rows[0] == "kx,ky,growth,frequency"
     assert len(rows) == 21
+
+
+def test_a_wavenumber_that_is_not_resolved_ends_nothing(capsys, tmp_path):
+    picture = tmp_path / "map.svg"
+    words = f"growth {PAPER} --flux 3 --kx 0:0.02 --ky 0:0.0218562 --size 4x4 --json --plot {picture}"
+    assert run(words) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["unresolved"] == [{"kx": 0.0, "ky": pytest.approx(0.0218562)}]
+    assert printed["growth"][0][3] is None
+    assert sum(value is None for row in printed["growth"] for value in row) == 1
+    assert printed["threshold"] == pytest.approx(1e-6 / printed["flow"]["h"] ** 0.5)
+    assert len(printed["neutral"]) == 1
+    drawing = picture.read_text()
+    assert "hatched" in drawing or "pattern" in drawing
+
+
+def test_round_off_of_the_mass_mode_is_no_growth(capsys):
+    assert run(f"growth {PAPER} --flux 3 --flow 2 --kx 0:1e-9 --ky 0:1e-9 --size 4x4") == 0
+    assert "growing: 0 of 16 points" in capsys.readouterr().out
+
+
+def test_what_is_not_known_is_hatched_and_nothing_else():
+    told = np.array([[0.1, 0.2, -0.1], [0.2, np.nan, -0.1], [0.1, 0.1, -0.2]])
+    flow = SimpleNamespace(chute=Chute(0.3, 0.8, 0.8, 0.6), mass_flux=3.0, centre_of_mass=2.0)
+    axis = np.array([0.0, 0.1, 0.2])
+    for rates in (told, np.nan_to_num(told), np.full((3, 3), np.nan)):
+        unknown = np.isnan(rates)
+        mapped: Any = SimpleNamespace(
+            flow=flow, kx=axis, ky=axis, growth=rates, grows=rates > 0.0, unresolved=unknown, neutral=()
+        )
+        figure = plot_wave_map(mapped)
+        hatches = [patch.get_hatch() for patch in figure.axes[0].patches]
+        assert hatches == (["////"] if unknown.any() else [])
+        # All shades lie within what is told: none is made up for the rest.
+        assert ("hatched" in figure.get_suptitle()) == unknown.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["10x10", "12x12"])
+def test_a_family_with_unresolved_waves_is_mapped(capsys, tmp_path, size):
+    path = tmp_path / "map.json"
+    assert run(f"neutral {PAPER} --waves across --size {size} --save {path}") == 0
+    assert "neutral curve 1" in capsys.readouterr().out
+    saved = json.loads(path.read_text())
+    hidden = sum(value is None for row in saved["growth"] for value in row)
+    assert hidden >= len(saved["unresolved"])
 
 
 @pytest.mark.slow

@@ -66,6 +66,15 @@ def test_beyond_a_fold_the_verdict_says_where_it_goes(capsys, heat, verdict):
     assert capsys.readouterr().out.splitlines()[-1].startswith(verdict)
 
 
+def test_the_rate_of_the_leading_mode_is_told_beside_what_was_seen(capsys):
+    assert run(f"{PAPER} --flux 3 --duration 60 --json") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["leading"] == pytest.approx(-0.13406, abs=1e-4)
+    assert printed["rate"] > printed["leading"]
+    assert run(f"{PAPER} --flux 3 --duration 60") == 0
+    assert "the leading discrete mode of that flow has the rate -0.134" in capsys.readouterr().out
+
+
 def test_too_short_a_time_is_said(capsys):
     assert run(f"{PAPER} --flux 3 --heat 2 --duration 5") == 0
     assert capsys.readouterr().out.splitlines()[-1].endswith("give a longer --duration")
@@ -125,5 +134,5 @@ def test_an_interruption_leaves_no_file_and_no_traceback(monkeypatch, capsys, tm
 
     monkeypatch.setattr("chuteflow.stability.relaxation.Radau.step", interrupted)
     assert run(f"{PAPER} --flux 3 --save {tmp_path / 'way.csv'}") == 130
-    assert capsys.readouterr().err.strip() == ""
+    assert capsys.readouterr().err.strip() == "chuteflow: interrupted"
     assert not list(tmp_path.iterdir())

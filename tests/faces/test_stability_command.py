@@ -7,6 +7,8 @@ import pytest
 
 import chuteflow
 from chuteflow.faces.cli import main
+from chuteflow.stability import search
+from chuteflow.stability.modes import UnresolvedError
 
 MATERIAL = ["--slope", "0.3", "--e", "0.8", "--ew", "0.8", "--roughness", "0.6"]
 #: Wavenumbers are given, so that no search is needed.
@@ -24,8 +26,18 @@ def test_json_object_holds_the_modes_of_every_flow(capsys):
     told = json.loads(out)
     assert code == 0
     assert told["chute"]["slope"] == 0.3
-    assert [flow["stable"] for flow in told["flows"]] == [True, True, False]
+    # One wave says nothing of the others: what it does is told beside it.
+    assert [flow["stable"] for flow in told["flows"]] == [None, None, None]
+    assert [flow["grows"] for flow in told["flows"]] == [False, False, True]
     for flow in told["flows"]:
+        assert flow["complete"] is False
+        assert flow["examined"] == 1
+        assert flow["unresolved"] == []
+        assert flow["wavenumbers"] == [0.01, 0.01]
+        assert flow["threshold"] == pytest.approx(1e-6 / flow["h"] ** 0.5)
+        assert "without --kx and --ky all are searched" in flow["why"]
+        rates = flow["budget"]["terms"]
+        assert sum(term["total"] for term in rates.values()) == pytest.approx(flow["mode"]["growth"], abs=1e-6)
         assert flow.keys() >= {"Q", "T_surface", "stable", "mode", "modes", "wavenumbers", "why"}
         assert flow["mode"].keys() == {"kx", "ky", "growth", "frequency", "speed", "kind", "error"}
         assert flow["modes"][0] == flow["mode"]
@@ -49,8 +61,34 @@ def test_waves_across_have_no_speed(capsys):
 def test_the_text_says_what_grows(capsys):
     code, out, _ = run(capsys, *MATERIAL, *AT)
     assert code == 0
-    assert "cold, dense, shallow: unstable: a wave along the slope, 628.32 grain diameters long" in out
-    assert "hot, dilute, deep: stable" in out
+    assert "cold, dense, shallow: a wave along the slope, 628.32 grain diameters long" in out
+    assert "this wave makes the flow unstable" in out
+    assert "hot, dilute, deep: a wave along the slope" in out
+    assert "whether the flow is stable is not known from this" in out
+    assert "stable:" not in out
+    assert out.count("energy of the mode: ") == 3
+
+
+def test_after_a_search_the_text_has_the_verdict_the_threshold_and_what_is_not_known(capsys, monkeypatch):
+    calm = ["--slope", "0.535", "--e", "0.684", "--ew", "0.5", "--roughness", "0.835", "--flux", "0.355"]
+    _, out, _ = run(capsys, *calm)
+    (flow,) = chuteflow.flows(chuteflow.Chute(0.535, 0.684, 0.5, 0.835), Q=0.355)
+    assert f"stable: nothing grows faster than {1e-6 / flow.centre_of_mass**0.5:.2g} for wavenumbers from " in out
+
+    def unknown(disturbances, kx, ky, **settings):
+        raise UnresolvedError(disturbances.flow, kx, ky)
+
+    monkeypatch.setattr(search, "leading", unknown)
+    code, out, _ = run(capsys, *calm, "--json")
+    assert code == 0
+    (flow,) = json.loads(out)["flows"]
+    assert flow["stable"] is None
+    assert flow["complete"] is True
+    assert {"kx": 0.0, "ky": 0.0} in flow["unresolved"]
+    assert "do not tell" in flow["why"]
+    code, out, _ = run(capsys, *calm)
+    assert "not known: nothing is known to grow" in out
+    assert "kx = 0 and ky = 0" in out
 
 
 def test_the_interface_is_answered_by_the_reason(capsys):
@@ -75,15 +113,16 @@ def test_no_flow_is_an_answer(capsys):
 
 
 def test_files_and_picture(capsys, tmp_path):
-    table, whole, picture = (tmp_path / name for name in ("m.csv", "m.json", "m.svg"))
+    table, whole, picture, budget = (tmp_path / name for name in ("m.csv", "m.json", "m.svg", "b.svg"))
     assert main(["stability", *MATERIAL, *AT, "--save", str(table), "--plot", str(picture)]) == 0
     with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["stable"] for row in rows] == ["true", "true", "false"]
+    assert [row["stable"] for row in rows] == ["", "", ""]
     assert float(rows[2]["growth"]) == pytest.approx(7.25595e-3, rel=1e-4)
     drawing = picture.read_text()
     assert drawing.count("axes_") >= 6
-    assert main(["stability", *MATERIAL, *AT, "--save", str(whole)]) == 0
+    assert main(["stability", *MATERIAL, *AT, "--save", str(whole), "--budget", str(budget)]) == 0
+    assert budget.read_text().count("axes_") >= 3
     mode = json.loads(whole.read_text())["flows"][2]["mode"]
     assert len(mode["z"]) == len(mode["nu"]["real"]) == len(mode["T"]["imaginary"])
     assert mode["z"][-1] == 0.0

@@ -40,6 +40,7 @@ CORRECTED = {
     "expansion-of-velocity",
     "far-gradient",
     "flow-c",
+    "inelastic-clustering",
     "interface-coefficients",
     "interface-inversion",
     "interface-profiles",

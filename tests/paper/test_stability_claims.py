@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from chuteflow.paper.claims import CLAIMS, stability
+from chuteflow.stability.budget import Budget, Term
 
 IDS = ("three-unstable-modes", "stable-in-a-small-part", "inversion-and-stability")
 
@@ -46,6 +47,29 @@ def test_other_flows_change_a_verdict(known, id, name, kind, density):
     table, judged = known
     table[name] = judged(kind, density)
     assert CLAIMS[id].check().verdict == "not confirmed"
+
+
+def budget(loss, shear, closure=1e-9):
+    """A budget with what the loss feeds in all, and the shear."""
+    parts = ("collisional loss by density", 3.0 * loss), ("collisional loss by temperature", -2.0 * loss)
+    terms = tuple(Term(name, thermal=rate) for name, rate in (*parts, ("shear production", shear)))
+    return Budget(SimpleNamespace(growth=0.01, direction="along"), terms, (0.3, 0.4, 0.3), closure)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("others", "of_kinds", "expected"),
+    [
+        (budget(0.05, 0.01), budget(0.05, 0.01), "confirmed"),
+        (budget(0.01, 0.05), budget(0.05, 0.01), "corrected"),
+        (budget(0.01, 0.05), budget(0.01, 0.05), "not confirmed"),
+        # Terms that do not add up to the growth rate decide nothing.
+        (budget(0.01, 0.05, closure=0.001), budget(0.05, 0.01), "not confirmed"),
+    ],
+)
+def test_what_feeds_the_modes_decides_on_clustering(monkeypatch, others, of_kinds, expected):
+    kinds = dict.fromkeys(("flow A", "flow C", "a steep flow"), of_kinds)
+    monkeypatch.setattr(stability, "_budgets", lambda: kinds | {"a steep flow, along": others})
+    assert CLAIMS["inelastic-clustering"].check().verdict == expected
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Stability marked along a curve: by a known verdict, and by the real one."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ def verdict(flow, unknown_below=0.0):
     T = flow.surface_temperature
     if unknown_below > T:
         raise SolveError("the finest grids do not tell")
-    return SimpleNamespace(stable=1.0 < T < 2.0, mode=SimpleNamespace(direction="across" if T > 1.5 else "along"))
+    mode = SimpleNamespace(direction="across" if T > 1.5 else "along", growth=0.01)
+    return SimpleNamespace(stable=1.0 < T < 2.0, mode=mode)
 
 
 def test_changes_are_located_between_samples_and_stand_among_the_special_points(curve, monkeypatch):
@@ -54,9 +56,19 @@ def test_what_is_not_known_is_said(curve, monkeypatch):
     assert sum(point.kind == along.CHANGE for point in branch.branch.special) == 2
 
 
+def test_a_verdict_that_is_not_given_is_not_known(curve, monkeypatch):
+    mode = SimpleNamespace(direction="along")
+    monkeypatch.setattr(along, "stability_of", lambda flow: SimpleNamespace(stable=None, mode=mode))
+    (branch,) = along.marked(curve, samples=3).branches
+    assert [run.label for run in branch.runs] == ["unknown"]
+    assert branch.changes == ()
+
+
 def test_samples_out_of_range_and_surfaces_that_cannot_be_posed_are_refused(curve):
-    with pytest.raises(InputError, match="samples = 1"):
-        along.marked(curve, samples=1)
+    refused: list[Any] = [1, "20", 2.5]
+    for samples in refused:
+        with pytest.raises(InputError, match=r"samples = .*must be"):
+            along.marked(curve, samples=samples)
     interface = chuteflow.curve(
         chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface="interface"), points=8, surface_temperature=(1.0, 5.0)
     )
@@ -84,6 +96,9 @@ def test_the_family_of_the_paper_is_stable_in_its_middle_alone(curve):
     # On both sides of each, the verdict is the one told
     for flow in changes:
         T = flow.surface_temperature
-        verdicts = [stability_of(chuteflow.flows(PAPER, T_surface=share * T)[0]).stable for share in (0.93, 1.07)]
-        assert sorted(verdicts) == [False, True]
+        verdicts = {stability_of(chuteflow.flows(PAPER, T_surface=share * T)[0]).stable for share in (0.93, 1.07)}
+        assert verdicts == {False, True}
+    # Each end is a neutral point: of waves across in hot flows, along in cold ones.
+    assert [change.flow.surface_temperature for change in branch.changes] == pytest.approx([1.92236, 1.00689], abs=2e-5)
+    assert all(change.neutral and change.error < 1e-4 for change in branch.changes)
     assert np.all([0.5 < flow.surface_temperature < 3.0 for flow in changes])

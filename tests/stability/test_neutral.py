@@ -65,6 +65,24 @@ def test_two_curves_are_found_once_each_and_none_where_nothing_grows():
     assert neutral_curves(none, none.scan(9)) == []
 
 
+def test_no_curve_is_made_up_where_growth_is_not_known():
+    plane = KnownPlane(lambda a, b: 0.1 * (b - 0.5) + 0.0 * a)
+    scan = plane.scan(9)
+    unknown = np.broadcast_to(scan.b > 0.3, scan.sigma.shape)
+    masked = Scan(scan.a, scan.b, np.where(unknown, np.nan, scan.sigma), unresolved=unknown)
+    assert len(neutral_curves(plane, scan)) == 1
+    assert neutral_curves(plane, masked) == []
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"kx": "0:0.1"}, {"kx": 0.1}, {"ky": ("0", "1")}, {"size": 4.5}, {"size": ("4", "4")}, {"size": (4.0, 4.5)}],
+)
+def test_what_is_no_range_or_size_is_refused(three, given):
+    with pytest.raises(InputError, match="must be"):
+        wave_map(three["C"], **({"kx": (0.0, 0.1), "ky": (0.0, 0.1)} | given))
+
+
 def test_on_the_neutral_curve_of_flow_a_the_leading_mode_neither_grows_nor_decays():
     flow = chuteflow.flows(PAPER, Q=3.0)[0]
     found = wave_map(flow, kx=(0.0, 0.02), ky=(0.0, 0.03), size=(6, 6))
@@ -119,6 +137,8 @@ def test_families_out_of_range_are_refused():
     flows = chuteflow.flows(PAPER, Q=3.0)
     refused: list[tuple[dict[str, Any], str]] = [
         ({"angle": 91.0}, "from 0"),
+        ({"angle": "across"}, "must be a number"),
+        ({"angle": 0.0, "depth_wavenumber": 0.1}, "must be two numbers"),
         ({"angle": 0.0, "depth_wavenumber": (0.1, 0.0)}, "must rise"),
     ]
     for settings, said in refused:

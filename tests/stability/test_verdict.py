@@ -5,7 +5,8 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, stability_of
-from chuteflow.stability.modes import Disturbances
+from chuteflow.stability import search, verdict
+from chuteflow.stability.modes import Disturbances, UnresolvedError
 from chuteflow.stability.verdict import growth_map, leading, leading_modes, wavenumbers
 
 from .population import random_flows, seen_again
@@ -66,7 +67,7 @@ def test_rapid_flows_with_inverted_density_break_up_into_longitudinal_vortices()
     # Forterre & Pouliquen (2002): a pattern across the slope, as long as the layer is deep.
     (flow,) = (f for f in chuteflow.flows(Chute(0.283, 0.892, 0.715, 0.555), Q=238.0) if f.density == "inverted")
     found, mode = mode_of(flow, kx=0.0)
-    assert not found.stable
+    assert found.grows
     assert mode.direction == "across"
     assert 1.0 < mode.ky * flow.centre_of_mass < 4.0
     assert mode.growth * np.sqrt(flow.centre_of_mass) > 0.3
@@ -78,15 +79,60 @@ def test_rapid_flows_with_inverted_density_break_up_into_longitudinal_vortices()
 def test_wavenumbers_can_be_fixed(three):
     found, mode = mode_of(three["C"], kx=0.01, ky=0.0)
     assert (mode.kx, mode.ky) == (0.01, 0.0)
-    assert not found.stable
+    assert found.grows
     found, mode = mode_of(three["C"], kx=0.3, ky=0.3)
-    assert found.stable
+    assert not found.grows
     assert mode.growth == pytest.approx(-0.174164, abs=1e-5)
+
+
+@pytest.mark.parametrize("given", [{"kx": 0.3, "ky": 0.3}, {"kx": 0.01, "ky": 0.0}, {"ky": 0.3}])
+def test_single_waves_and_single_directions_say_nothing_of_the_whole(three, given):
+    found = stability_of(three["C"], **given)
+    assert found.stable is None
+    assert not found.complete
+    if len(given) == 2:
+        assert found.searched == pytest.approx((np.hypot(*given.values()),) * 2)
+        assert found.examined == 1
+
+
+def never_told(where):
+    """The leading modes, but unresolved at the wavenumbers of ``where``."""
+
+    def told(disturbances, kx, ky, **settings):
+        if where(kx, ky):
+            raise UnresolvedError(disturbances.flow, kx, ky)
+        return leading(disturbances, kx, ky, **settings)
+
+    return told
+
+
+def test_an_unresolved_wave_is_told_and_raises_nothing(three, monkeypatch):
+    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: True))
+    found = stability_of(three["A"], kx=0.01, ky=0.02)
+    assert (found.stable, found.mode, found.grows) == (None, None, False)
+    assert found.unresolved == ((0.01, 0.02),)
+
+
+def test_a_flow_with_unresolved_wavenumbers_is_not_called_stable_but_unstable_if_something_grows(monkeypatch):
+    (calm,) = chuteflow.flows(Chute(0.535, 0.684, 0.5, 0.835), Q=0.355)
+    monkeypatch.setattr(search, "leading", never_told(lambda kx, ky: kx == ky == 0.0))
+    found = stability_of(calm)
+    assert found.stable is None
+    assert found.complete
+    assert found.unresolved == ((0.0, 0.0),)
+    steep = chuteflow.flows(Chute(0.568, 0.627, 0.478, 0.847), T_surface=9.5)[0]
+    # The summit itself is unresolved: its mode is known all the same, by itself.
+    monkeypatch.setattr(search, "leading", never_told(lambda kx, ky: 0.03 < ky < 0.06))
+    found = stability_of(steep)
+    assert found.stable is False
+    assert found.unresolved
+    assert found.mode is not None
+    assert found.mode.growth == pytest.approx(0.0094762, rel=1e-4)
 
 
 def test_the_mass_mode_does_not_count_at_rest(three):
     found, mode = mode_of(three["A"], kx=0.0, ky=0.0)
-    assert found.stable
+    assert not found.grows
     assert mode.kind == "uniform"
     assert mode.growth == pytest.approx(-0.13406, abs=1e-4)
 
@@ -100,6 +146,26 @@ def test_a_map_holds_the_leading_modes(three):
     assert (found.error < 1e-5).all()
     (mode,) = leading_modes(flow, 0.01, 0.02)
     assert abs(found.growth[1, 2] + 1j * found.frequency[1, 2] - mode.growth - 1j * mode.frequency) < 1e-6
+
+
+def test_a_map_goes_on_where_the_grids_do_not_tell(three, monkeypatch):
+    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: kx == 0.0))
+    found = growth_map(Disturbances(three["C"]), np.array([0.0, 0.01]), np.array([0.0, 0.01]))
+    assert found.unresolved.tolist() == [[True, True], [False, False]]
+    assert np.isnan(found.growth[0]).all()
+    assert np.isfinite(found.growth[1]).all()
+
+
+@pytest.mark.parametrize("given", [{"kx": "0.1"}, {"ky": [1.0]}, {"kx": 0.1, "ky": "0"}, {"kx": True}])
+def test_what_is_no_wavenumber_is_refused(three, given):
+    with pytest.raises(chuteflow.InputError, match="must be a number"):
+        stability_of(three["C"], **given)
+
+
+def test_the_message_is_true_of_hot_flows_and_of_cold_ones(three):
+    assert "cold" not in str(UnresolvedError(three["A"], 0.0, 0.02))
+    (cold,) = chuteflow.flows(Chute(0.3, 0.8, 0.8, 0.6), T_surface=5e-4)[-1:]
+    assert "M/T_surface" in str(UnresolvedError(cold, 0.0, 0.02))
 
 
 def test_a_mode_is_followed_to_wavenumbers_close_by(disturbances):
@@ -121,10 +187,9 @@ def test_the_coldest_flows_are_refused_or_right():
 def test_what_grows_in_random_flows_grows_on_another_family_of_maps(seed, count):
     told = 0
     for flow in random_flows(seed, count):
-        try:
-            found = stability_of(flow)
-        except chuteflow.SolveError:
-            assert flow.mass_holdup / flow.surface_temperature > 1e4  # none but the coldest are refused
+        found = stability_of(flow)
+        if found.stable is None:
+            assert flow.mass_holdup / flow.surface_temperature > 1e4  # none but the coldest are not known
             continue
         told += 1
         if not found.stable:

@@ -31,12 +31,12 @@ _NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
 def plot_wave_map(found: WaveMap) -> Figure:
     """Growth over wavenumbers along and across the slope."""
     figure, (ax,) = style.panels(1, width=5.2, height=4.2)
-    _shaded(figure, ax, found.kx, found.ky, found.growth)
+    _shaded(figure, ax, found.kx, found.ky, found.growth, found.unresolved)
     for curve in found.neutral:
         ax.plot(*curve.z.T, **_NEUTRAL.line(1.6))
-    growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
+    growth = np.where(found.grows, found.growth, -np.inf)
     i, j = np.unravel_index(int(growth.argmax()), growth.shape)
-    if growth[i, j] > 0.0:
+    if found.grows[i, j]:
         ax.plot(
             found.kx[i], found.ky[j], marker="+", markersize=8.0, color=style.BLACK, clip_on=False, linestyle="none"
         )
@@ -45,7 +45,7 @@ def plot_wave_map(found: WaveMap) -> Figure:
     ax.set_ylim(found.ky[0], found.ky[-1])
     flow = found.flow
     place = rf"$Q = {flow.mass_flux:.4g}$, $h = {flow.centre_of_mass:.4g}$"
-    style.caption(figure, f"{parameters(flow.chute)}\n{place}; bold: neutral")
+    style.caption(figure, f"{parameters(flow.chute)}\n{place}; bold: neutral{_hatched(found.growth)}")
     return figure
 
 
@@ -55,7 +55,7 @@ def plot_family_map(found: FamilyMap) -> Figure:
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
     warmth = np.array([flow.surface_temperature for flow in found.flows])
     place = np.linspace(0.0, 1.0, len(warmth))
-    _shaded(figure, left, found.depth_wavenumber, place, found.growth)
+    _shaded(figure, left, found.depth_wavenumber, place, found.growth, found.unresolved)
     style.logarithmic(left, "x")
     ticks = _round_places(place, warmth)
     left.set_yticks([*ticks], [*ticks.values()])
@@ -73,7 +73,7 @@ def plot_family_map(found: FamilyMap) -> Figure:
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
         found.angle, f"waves at {found.angle:g} degrees to the slope"
     )
-    style.caption(figure, f"{parameters(found.flows[0].chute)}; {waves}; bold: neutral")
+    style.caption(figure, f"{parameters(found.flows[0].chute)}; {waves}; bold: neutral{_hatched(found.growth)}")
     return figure
 
 
@@ -98,12 +98,26 @@ def _round_places(place: Any, warmth: Any) -> dict[float, str]:
     return found
 
 
-def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any) -> None:
-    """Shades that are white at zero growth; what decays fast, or is hidden by the continuous spectrum, is deep."""
+def _hatched(growth: Any) -> str:
+    return "" if np.isfinite(growth).all() else "; hatched: no mode told"
+
+
+def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any) -> None:
+    """Shades that are white at zero growth, hatches where no mode is told, and crosses where growth is not known."""
+    from matplotlib.patches import Rectangle
     from matplotlib.ticker import MaxNLocator
 
+    told = np.isfinite(growth)
+    if not told.all():
+        unit = Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, zorder=0.0, facecolor="white")
+        unit.set(hatch="////", edgecolor=style.GREY, linewidth=0.0)
+        ax.add_patch(unit)
+        for i, j in np.argwhere(unresolved):
+            ax.plot(x[i], y[j], marker="x", markersize=4.0, color=style.GREY, clip_on=False, linestyle="none")
+    if not (told[1:, 1:] & told[:-1, 1:] & told[1:, :-1] & told[:-1, :-1]).any():
+        return
     largest = float(np.nanmax(growth, initial=0.0)) or float(np.nanmax(np.abs(growth), initial=1e-12))
-    shown = np.clip(np.nan_to_num(growth, nan=-np.inf), -_DEEPEST * largest, largest)
+    shown = np.ma.masked_invalid(np.clip(growth, -_DEEPEST * largest, largest))
     levels = np.linspace(-_DEEPEST * largest, largest, 3 * _SHADES + 1)
     norm = _halves(largest)
     shades = ax.contourf(x, y, shown.T, levels=levels, cmap=_MAP_OF_COLOURS, norm=norm)

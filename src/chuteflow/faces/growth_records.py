@@ -12,6 +12,7 @@ from chuteflow.faces import contract
 if TYPE_CHECKING:
     from chuteflow.stability.neutral import NeutralCurve
     from chuteflow.stability.planes import FamilyMap, WaveMap
+    from chuteflow.steady.flow import Flow
 
 _ALONG = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}
 
@@ -25,6 +26,11 @@ def wave_object(found: WaveMap) -> dict[str, Any]:
         "ky": found.ky.tolist(),
         "growth": _finite(found.growth),
         "frequency": _finite(found.frequency),
+        "threshold": found.smallest_rate,
+        "growing": int(found.grows.sum()),
+        "unresolved": [
+            {"kx": float(found.kx[i]), "ky": float(found.ky[j])} for i, j in np.argwhere(found.unresolved).tolist()
+        ],
         "neutral": [
             {"kx": curve.z[:, 0].tolist(), "ky": curve.z[:, 1].tolist(), **_of_curve(curve)} for curve in found.neutral
         ],
@@ -40,6 +46,12 @@ def family_object(found: FamilyMap) -> dict[str, Any]:
         "flows": _numbers(found.flows),
         "growth": _finite(found.growth),
         "frequency": _finite(found.frequency),
+        "threshold": found.smallest_rate.tolist(),
+        "growing": int(found.grows.sum()),
+        "unresolved": [
+            {"kh": float(found.depth_wavenumber[i]), **_place(found.flows[j])}
+            for i, j in np.argwhere(found.unresolved).tolist()
+        ],
         "neutral": [
             {"kh": curve.z[:, 0].tolist(), **_numbers(flows), **_of_curve(curve)}
             for curve, flows in zip(found.neutral, found.neutral_flows, strict=True)
@@ -48,7 +60,7 @@ def family_object(found: FamilyMap) -> dict[str, Any]:
 
 
 def wave_rows(found: WaveMap) -> Iterator[list[str]]:
-    """The map as rows of CSV; an empty cell where no mode is told from the continuous spectrum."""
+    """The map as rows of CSV; an empty cell where growth is not known."""
     yield ["kx", "ky", "growth", "frequency"]
     for i, along in enumerate(found.kx.tolist()):
         for j, across in enumerate(found.ky.tolist()):
@@ -57,7 +69,7 @@ def wave_rows(found: WaveMap) -> Iterator[list[str]]:
 
 
 def family_rows(found: FamilyMap) -> Iterator[list[str]]:
-    """The map as rows of CSV; an empty cell where no mode is told from the continuous spectrum."""
+    """The map as rows of CSV; an empty cell where growth is not known."""
     yield ["kh", *_ALONG, "growth", "frequency"]
     for j, flow in enumerate(found.flows):
         of_flow = [float(getattr(flow, name)) for name in _ALONG.values()]
@@ -68,6 +80,10 @@ def family_rows(found: FamilyMap) -> Iterator[list[str]]:
 
 def _of_curve(curve: NeutralCurve) -> dict[str, Any]:
     return {"frequency": curve.frequency.tolist(), "error": curve.error.tolist(), "ends": list(curve.ends)}
+
+
+def _place(flow: Flow) -> dict[str, float]:
+    return {symbol: float(getattr(flow, name)) for symbol, name in _ALONG.items()}
 
 
 def _numbers(flows: Any) -> dict[str, list[float]]:

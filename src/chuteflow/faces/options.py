@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -225,22 +226,31 @@ def search(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in arguments.items() if value is not None}
 
 
-def deliver(given: Mapping[str, Any], answer: str, save: Callable[[str], None], plot: Callable[[], Figure]) -> None:
-    """Write the files that --save and --plot name, and print the answer, which no full disk is to cost.
+def deliver(
+    given: Mapping[str, Any],
+    answer: str,
+    save: Callable[[str], None],
+    plot: Callable[[], Figure],
+    **pictures: Callable[[], Figure],
+) -> None:
+    """Write the files that --save, --plot and options of ``pictures`` name, and print the answer.
+
+    No full disk is to cost the answer.
 
     Raises:
         InputError: once the answer is printed, for files that could not be written.
     """
 
-    def draw(path: str) -> None:
+    def draw(figure: Callable[[], Figure], path: str) -> None:
         from chuteflow.faces.plots import write_figure
         from chuteflow.paper import style
 
         with style.own_settings():
-            write_figure(plot(), path)
+            write_figure(figure(), path)
 
     failures = []
-    for name, write in (("save", save), ("plot", draw)):
+    writers = {"save": save} | {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
+    for name, write in writers.items():
         if given[name] is not None:
             try:
                 write(given[name])

@@ -10,8 +10,9 @@ from chuteflow.faces.plots import key_of_beyond, key_of_kinds, line, mark, param
 from chuteflow.faces.stability_records import mode_object
 from chuteflow.faces.tables import number
 from chuteflow.paper import style
-from chuteflow.stability.along import STABLE, UNKNOWN, MarkedCurve, Run
+from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, Run
 from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
@@ -80,10 +81,7 @@ def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
     return [
         [
             {
-                **{
-                    NUMBERS[name].symbol: getattr(sample.flow, name) * factor(name, sample.flow.chute, scales)
-                    for name in PLACE
-                },
+                **_place(sample.flow, scales),
                 "stable": None if sample.found is None else sample.found.stable,
                 "mode": None if sample.found is None or sample.found.mode is None else mode_object(sample.found.mode),
             }
@@ -91,6 +89,33 @@ def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
         ]
         for branch in marked.branches
     ]
+
+
+def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
+    """The changes of stability of each branch, with the error of T_surface, and whether they are neutral points."""
+    return [
+        [
+            {
+                **_place(change.flow, scales),
+                "error": change.error * factor("surface_temperature", change.flow.chute, scales),
+                "neutral": change.neutral,
+            }
+            for change in branch.changes
+        ]
+        for branch in marked.branches
+    ]
+
+
+def change_words(change: Change, chute: Chute, scales: Scales | None) -> str:
+    """Where stability changes, and how well that is known."""
+    warmth = factor("surface_temperature", chute, scales)
+    what = "neutral" if change.neutral else "the verdict changes"
+    T, error = change.flow.surface_temperature * warmth, change.error * warmth
+    return f"{what} at T_surface = {T:.6g} +- {error:.1g}"
+
+
+def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
+    return {NUMBERS[name].symbol: getattr(flow, name) * factor(name, flow.chute, scales) for name in PLACE}
 
 
 def stretch(run: Run, chute: Chute, scales: Scales | None) -> str:

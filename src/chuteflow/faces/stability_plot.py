@@ -53,6 +53,42 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     return figure
 
 
+def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
+    """The energy budget of the leading mode of each flow: bars of the terms, that add up to the growth rate."""
+    from chuteflow.stability.budget import TERMS, energy_budget
+
+    drawn = [answer for answer in answers if answer.modes]
+    if not drawn:
+        reasons = [answer.reason for answer in answers if answer.reason]
+        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
+    figure, axes = style.panels(1, len(drawn), width=7.2, height=0.6 + 2.9 * len(drawn))
+    names = list(TERMS)
+    places = np.arange(len(names), 0, -1)
+    for ax, answer in zip(axes, drawn, strict=True):
+        budget = energy_budget(answer.modes[0])
+        rates = np.array([[term.kinetic, term.density, term.thermal] for term in budget.terms])
+        # Parts of one sign are put end to end, on their side of zero.
+        for sign in (1.0, -1.0):
+            parts = np.where(sign * rates > 0.0, rates, 0.0)
+            left = np.cumsum(parts, axis=1) - parts
+            for i, part in enumerate(("kinetic", "density", "thermal")):
+                label = part if sign > 0.0 else None
+                ax.barh(places, parts[:, i], left=left[:, i], height=0.6, color=style.stroke(i + 1).colour, label=label)
+        ax.plot(
+            rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total"
+        )
+        ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
+        ax.axvline(budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
+        ax.set_yticks(places, names)
+        style.name_axes(ax, "rate of the energy of the mode, over twice the energy", "")
+        title = f"{words.among(answer.flow, flows)}: {budget.mode.kind}, growth {budget.mode.growth:.3g}"
+        ax.set_title(title, loc="right", **style.title())
+    style.caption(figure, parameters(flows.chute))
+    handles, labels = axes[0].get_legend_handles_labels()
+    style.legend(figure, handles=handles, labels=labels, loc="outside lower center", ncols=5)
+    return figure
+
+
 def _profiles(ax: Axes, mode: Mode, top: float) -> None:
     height, disturbed = mode.sampled()
     fields = np.abs(disturbed)

@@ -10,6 +10,7 @@ import numpy as np
 
 from chuteflow.analysis.results import FlowSet
 from chuteflow.faces.contract import chute_object, finite, flow_object, searched_object
+from chuteflow.stability.budget import Budget, energy_budget
 from chuteflow.stability.modes import Mode
 from chuteflow.stability.verdict import Stability
 from chuteflow.steady.flow import Flow
@@ -58,13 +59,32 @@ def mode_object(mode: Mode, *, fields: bool = False) -> dict[str, Any]:
     return numbers
 
 
+def budget_object(budget: Budget) -> dict[str, Any]:
+    """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates."""
+    return {
+        "growth": finite(budget.mode.growth),
+        "closure": finite(budget.closure),
+        "shares": dict(zip(("kinetic", "density", "thermal"), map(finite, budget.shares), strict=True)),
+        "terms": {
+            term.name.replace(" ", "_"): {
+                "kinetic": finite(term.kinetic),
+                "density": finite(term.density),
+                "thermal": finite(term.thermal),
+                "total": finite(term.total),
+            }
+            for term in budget.terms
+        },
+    }
+
+
 def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
     """A head and one row for each mode, or one for a flow without; empty where there is no number."""
     rows: list[list[str]] = [list(COLUMNS)]
     for answer in answers:
         flow = flow_object(answer.flow)
         start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]
-        stable = "" if answer.found is None else str(answer.found.stable).lower()
+        known = None if answer.found is None else answer.found.stable
+        stable = "" if known is None else str(known).lower()
         for mode in answer.modes or (None,):
             numbers = {} if mode is None else mode_object(mode)
             cells = [numbers.get(name) for name in COLUMNS[5:]]
@@ -80,6 +100,24 @@ def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
         "stable": None if found is None else found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
+        "budget": None if not answer.modes else budget_object(energy_budget(answer.modes[0])),
+        "grows": None if found is None or found.mode is None else found.grows,
+        "threshold": None if found is None else found.smallest_rate,
         "wavenumbers": None if found is None else list(found.searched),
-        "why": answer.reason,
+        "complete": False if found is None else found.complete,
+        "examined": 0 if found is None else found.examined,
+        "unresolved": [] if found is None else [{"kx": kx, "ky": ky} for kx, ky in found.unresolved],
+        "why": answer.reason or (None if found is None else why_unknown(found)),
     }
+
+
+def why_unknown(found: Stability) -> str | None:
+    """Why ``stable`` is None, or None where it is not."""
+    if found.stable is not None:
+        return None
+    if not found.complete:
+        return "one wave or one direction was examined: without --kx and --ky all are searched"
+    return (
+        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids do not "
+        "tell whether something does"
+    )

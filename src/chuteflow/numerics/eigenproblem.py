@@ -104,28 +104,81 @@ def arnoldi(matrix: Complex, start: Complex, steps: int) -> tuple[Complex, Compl
     return mu, basis[:, :steps] @ small
 
 
+@dataclass(frozen=True, eq=False)
+class Eigenpair:
+    """An eigenvalue with its right and left vectors (n,): A v = sigma B v and y* A = sigma y* B."""
+
+    value: complex
+    right: Complex
+    left: Complex
+
+    def size(self, weights: Array) -> complex:
+        """left* B right with B = diag(``weights``): sigma changes by left* dA right over it."""
+        return complex(self.left.conj() @ (weights * self.right))
+
+    def likeness(self, other: Eigenpair, weights: Array) -> float:
+        """1 for the pair itself, 0 for another one of the same problem, near 1 for the same of a problem close by."""
+        own, others = (abs(self.left.conj() @ (weights * of.right)) / np.linalg.norm(of.right) for of in (self, other))
+        return float(others / own)
+
+
 def refined(matrix: Complex, weights: Array, near: complex, steps: int = 5) -> tuple[complex, Complex]:
     """The eigenvalue closest to ``near`` and its vector, by inverse iteration with one factorisation.
 
     ``near`` is to be much closer to it than to all others, such as its value in another discretisation.
     """
-    shifted = matrix.astype(complex)
-    # Off the eigenvalue by more than rounding, so that the factors are regular.
-    shift = near + 1e-9 * (1.0 + abs(near))
-    shifted[np.diag_indices_from(shifted)] -= shift * weights
-    size = np.abs(shifted).max(axis=1)
-    factors = lu_factor(shifted / size[:, None], check_finite=False)
-    right = weights / size
-    live = weights != 0.0
-    vector = np.exp(1j * np.arange(len(weights)))
-    mu = 0j
-    for _ in range(steps):
-        image = lu_solve(factors, right * vector, check_finite=False)
-        before, mu = mu, (vector[live].conj() @ image[live]) / (vector[live].conj() @ vector[live])
-        vector = image / np.abs(image).max()
-        if abs(mu - before) < 1e-11 * abs(mu):
-            break
-    return complex(shift + 1.0 / mu), vector
+    return _Factors.of(matrix, weights, near).iterated(steps)
+
+
+def refined_pair(
+    matrix: Complex, weights: Array, near: complex, steps: int = 5, start: Complex | None = None
+) -> Eigenpair:
+    """The same with the left vector, from the same factors; ``start`` is a vector that is close to the right one."""
+    factors = _Factors.of(matrix, weights, near)
+    value, right = factors.iterated(steps, start)
+    return Eigenpair(value, right, factors.left(right))
+
+
+@dataclass(frozen=True, eq=False)
+class _Factors:
+    """Factors of A - shift B, its rows divided by their ``size``, for inverse iteration."""
+
+    shift: complex
+    weights: Array
+    size: Array
+    factors: tuple[Any, Any]
+
+    @classmethod
+    def of(cls, matrix: Complex, weights: Array, near: complex) -> _Factors:
+        shifted = matrix.astype(complex)
+        # Off the eigenvalue by more than rounding, so that the factors are regular.
+        shift = near + 1e-9 * (1.0 + abs(near))
+        shifted[np.diag_indices_from(shifted)] -= shift * weights
+        size = np.abs(shifted).max(axis=1)
+        return cls(shift, weights, size, lu_factor(shifted / size[:, None], check_finite=False))
+
+    def iterated(self, steps: int, start: Complex | None = None) -> tuple[complex, Complex]:
+        right = self.weights / self.size
+        live = self.weights != 0.0
+        vector = np.exp(1j * np.arange(len(self.weights))) if start is None else start
+        mu = 0j
+        for _ in range(steps):
+            image = lu_solve(self.factors, right * vector, check_finite=False)
+            before, mu = mu, (vector[live].conj() @ image[live]) / (vector[live].conj() @ vector[live])
+            vector = image / np.abs(image).max()
+            if abs(mu - before) < 1e-11 * abs(mu):
+                break
+        return complex(self.shift + 1.0 / mu), vector
+
+    def left(self, right: Complex, steps: int = 4) -> Complex:
+        """The left vector, by as many solutions with the conjugate transpose as its direction needs."""
+        vector = right / np.linalg.norm(right)
+        for _ in range(steps):
+            image = lu_solve(self.factors, self.weights * vector, trans=2, check_finite=False) / self.size
+            vector, before = image / np.linalg.norm(image), vector
+            if abs(vector.conj() @ before) > 1.0 - 1e-12:
+                break
+        return vector
 
 
 def drift(values: Complex, others: Complex) -> Array:

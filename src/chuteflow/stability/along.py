@@ -1,4 +1,8 @@
-"""Stability along a curve of flows: samples judged one by one, and the places where it changes."""
+"""Stability along a curve of flows: samples judged one by one, and the places where it changes.
+
+Near the end of a stable range growth is slower than what counts as growth before it vanishes. There the neutral curve
+of the waves that begin to grow is followed to its extreme, and the end is that neutral point.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +13,24 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow import display
-from chuteflow.analysis.paths import solve_between
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
-from chuteflow.stability.verdict import Stability, stability_of
+from chuteflow.stability.family import flow_between
+from chuteflow.stability.modes import smallest_rate
+from chuteflow.stability.neutral import EDGE, neutral_curves
+from chuteflow.stability.planes import FamilyPlane, scanned
+from chuteflow.stability.verdict import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
 #: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
 _MOST_SAMPLES = 2000
+#: Growth, in units of what counts as growth, below which a neutral point is looked for; flows and points of its plane.
+_SLOW, _MEMBERS, _PLANE = 30.0, 5, (7, 5)
+#: How far the plane reaches into the stable range, in brackets of the verdict.
+_REACHES = (3.0, 12.0, 64.0)
 #: The special point between a stable and an unstable flow.
 CHANGE = "stability-change"
 #: Labels beside the directions of growing modes.
@@ -40,7 +51,7 @@ class Sample:
     @property
     def label(self) -> str:
         """ "stable", the direction of the mode that grows fastest, or "unknown"."""
-        if self.found is None:
+        if self.found is None or self.found.stable is None:
             return UNKNOWN
         if self.found.stable or self.found.mode is None:
             return STABLE
@@ -59,15 +70,27 @@ class Run:
 
 
 @dataclass(frozen=True, eq=False)
-class MarkedBranch:
-    """A branch with its changes of stability among the special points, its ``samples`` and its ``runs``.
+class Change:
+    """Where stability changes: a ``flow`` at a ``position`` along a branch, with the ``error`` of its T_surface.
 
-    A change is known to ``spacing``/2^7 flows of the branch, with ``spacing`` that of the samples.
+    If ``neutral``, it is the neutral point, where growth vanishes for the waves of the range searched. Else it is the
+    middle of the two flows between which the verdict changes, half of their distance the error.
     """
+
+    flow: Flow
+    position: float
+    error: float
+    neutral: bool
+
+
+@dataclass(frozen=True, eq=False)
+class MarkedBranch:
+    """A branch with its ``changes`` of stability, also among its special points, its ``samples`` and its ``runs``."""
 
     branch: Branch
     samples: tuple[Sample, ...]
     runs: tuple[Run, ...]
+    changes: tuple[Change, ...]
 
     def __repr__(self) -> str:
         labels = ", ".join(run.label for run in self.runs)
@@ -112,35 +135,27 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     return MarkedCurve(replace(curve, branches=tuple(one.branch for one in found)), tuple(found))
 
 
-def flow_between(flows: Sequence[Flow], position: float) -> Flow:
-    """The flow at a position between two neighbours of a family, or a little beyond its ends, counted in ``flows``."""
-    i = int(np.clip(np.floor(position), 0, len(flows) - 2))
-    first, last = flows[i], flows[i + 1]
-    share = position - i
-    if share in (0.0, 1.0):
-        return last if share else first
-    return Flow(first.chute, solve_between(first.solution, last.solution, share))
-
-
 def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> MarkedBranch:
     places = np.unique(np.linspace(0, len(branch.flows) - 1, min(samples, len(branch.flows))).round()).tolist()
     judged: list[Sample] = []
     for place in places:
         judged.append(_judged(branch, place))
         told(len(judged) / len(places))
-    breaks, changes = [], []
+    breaks: list[tuple[float, str]] = []
+    changes: list[Change] = []
     for one, two in pairwise(judged):
         if one.label == two.label:
             continue
         if UNKNOWN not in (one.label, two.label) and STABLE in (one.label, two.label):
-            place = _change(branch, one, two)
-            changes.append(SpecialPoint(CHANGE, flow_between(branch.flows, place), int(place)))
+            changes.append(_change(branch, one, two))
+            place = changes[-1].position
         else:
             place = 0.5 * (one.position + two.position)
         breaks.append((place, two.label))
-    special = tuple(sorted([*branch.special, *changes], key=lambda point: point.position))
+    points = [SpecialPoint(CHANGE, change.flow, int(change.position)) for change in changes]
+    special = tuple(sorted([*branch.special, *points], key=lambda point: point.position))
     runs = tuple(_runs(branch, judged[0].label, breaks))
-    return MarkedBranch(replace(branch, special=special), tuple(judged), runs)
+    return MarkedBranch(replace(branch, special=special), tuple(judged), runs, tuple(changes))
 
 
 def _judged(branch: Branch, place: float) -> Sample:
@@ -151,18 +166,58 @@ def _judged(branch: Branch, place: float) -> Sample:
         return Sample(place, flow, None)
 
 
-def _change(branch: Branch, one: Sample, two: Sample) -> float:
-    """The position between two samples where stability changes, by bisection: rates only vanish on one side."""
-    low, high = one.position, two.position
+def _change(branch: Branch, one: Sample, two: Sample) -> Change:
+    """The place between two samples where stability changes: the neutral point, or the middle of a bracket."""
+    stable, unstable = (one, two) if one.label == STABLE else (two, one)
+    inner, outer = stable, unstable
     for _ in range(_HALVINGS):
-        middle = _judged(branch, 0.5 * (low + high))
+        middle = _judged(branch, 0.5 * (inner.position + outer.position))
         if middle.label == UNKNOWN:
             break
-        if (middle.label == STABLE) == (one.label == STABLE):
-            low = middle.position
+        if middle.label == STABLE:
+            inner = middle
         else:
-            high = middle.position
-    return 0.5 * (low + high)
+            outer = middle
+    # The neutral curve is followed in a plane of its own size: it may be near the bracket or far inside.
+    width, farthest = inner.position - outer.position, abs(stable.position - outer.position)
+    for reach in _REACHES:
+        begin = outer.position + float(np.sign(width)) * min(reach * abs(width), farthest)
+        found = _neutral(branch, begin, outer)
+        if found is not None:
+            return found
+    return _between(branch, inner, outer)
+
+
+def _between(branch: Branch, inner: Sample, outer: Sample) -> Change:
+    place = 0.5 * (inner.position + outer.position)
+    width = abs(inner.flow.surface_temperature - outer.flow.surface_temperature)
+    return Change(flow_between(branch.flows, place), place, 0.5 * width, neutral=False)
+
+
+def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
+    """The neutral point between the place of a stable flow and one that grows slowly; None where none is reached."""
+    found = outer.found
+    if found is None or found.mode is None or found.mode.growth > _SLOW * smallest_rate(outer.flow):
+        return None
+    mode = found.mode
+    k = float(np.hypot(mode.kx, mode.ky)) * outer.flow.centre_of_mass
+    if k == 0.0:
+        return None
+    places = np.linspace(stable, outer.position, _MEMBERS)
+    flows = [flow_between(branch.flows, float(place)) for place in places]
+    low = float(np.log(RANGE[0]))
+    plane = FamilyPlane(flows, float(np.arctan2(mode.ky, mode.kx)), low, float(np.log(max(3.0 * k, 0.1))) - low)
+    extremes = []
+    for curve in neutral_curves(plane, scanned(plane, _PLANE)):
+        i = int(curve.z[:, 1].argmin())
+        ended = {0: curve.ends[0], len(curve.z) - 1: curve.ends[1]}.get(i, EDGE)
+        extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended == EDGE and curve.z[i, 1] > 0.0))
+    if not extremes or not min(extremes)[2]:
+        return None
+    share, error, _ = min(extremes)
+    per_share = abs(flows[-1].surface_temperature - flows[0].surface_temperature)
+    place = stable + share * (outer.position - stable)
+    return Change(flow_between(branch.flows, place), place, error * per_share, neutral=True)
 
 
 def _runs(branch: Branch, label: str, breaks: Sequence[tuple[float, str]]) -> Iterator[Run]:

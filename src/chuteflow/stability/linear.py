@@ -43,6 +43,8 @@ FIELDS = 5
 
 #: Wavenumbers at which the quadratic operator is evaluated, and their monomials 1, kx, ky, kx^2, kx ky, ky^2.
 _SAMPLES = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1]], dtype=float)
+#: Step, in shares of k, of the derivatives of the gas above the grid: smooth, and small beside the rest.
+_DIFFERENCE = 1e-5
 
 
 def _monomials(kx: Any, ky: Any) -> NDArray[Any]:
@@ -68,6 +70,19 @@ class Operator:
         matrix = np.tensordot(_monomials(kx, ky), self.powers, axes=1)
         self._add_half_space(matrix, kx, ky)
         return matrix
+
+    def slopes(self, left: Complex, right: Complex, kx: float, ky: float) -> Complex:
+        """d/dkx and d/dky, (2,), of left* A right."""
+        parts = (self.powers @ right) @ left.conj()
+        step = _DIFFERENCE * float(np.hypot(kx, ky))
+        out = np.array([[0.0, 1.0, 0.0, 2.0 * kx, ky, 0.0], [0.0, 0.0, 1.0, 0.0, kx, 2.0 * ky]]) @ parts
+        for i, (x, y) in enumerate(((step, 0.0), (0.0, step))):
+            change = np.zeros(self.powers.shape[1:], dtype=complex)
+            self._add_half_space(change, kx - x, ky - y)
+            change *= -1.0
+            self._add_half_space(change, kx + x, ky + y)
+            out[i] += left.conj() @ (change @ right) / (2.0 * step)
+        return out
 
     def _add_half_space(self, matrix: Complex, kx: float, ky: float) -> None:
         """Stresses and heat flux of the gas above the grid, taken off those of the grid at its top."""

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from chuteflow import display
+from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
@@ -30,6 +31,8 @@ from chuteflow.steady.flow import Flow
 #: ln(1 + M/T) + k T: what is dense or short in z needs points near the base.
 DEGREES = ((32, 44), (48, 64), (72, 96))
 _WEIGHTS, _LARGEST_WEIGHT = (0.5, 0.8), 16.0
+#: Degree of the coarsest grid, on which wavenumbers are searched for what may grow.
+_SCREEN = 20
 #: How far the grids reach, in ln p, for k h >= _SHORT M, and more for longer waves.
 _REACH, _SHORT = ((10.5, 13.0), (12.0, 14.5), (13.5, 16.5)), 1.0 / 60.0
 #: Steps in which the reach grows, so that wavenumbers share grids.
@@ -43,8 +46,23 @@ _DRIFT, _ARTEFACT = 1e-3, 0.03
 TOLERANCE = 1e-6
 #: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
 NEUTRAL, AT_REST = 1e-6, 1e-10
+#: M/T_surface from which the coldness of a flow is why grids do not resolve it.
+_COLD = 1e3
 #: Smallest and largest wavenumber that is not 0, in 1/d.
 _SMALLEST, _LARGEST = 1e-15, 1e4
+
+
+class UnresolvedError(SolveError):
+    """Something seems to grow at ``kx``, ``ky`` that the finest grids do not resolve: whether it does is not known."""
+
+    def __init__(self, flow: Flow, kx: float, ky: float) -> None:
+        self.kx, self.ky = kx, ky
+        coldness = flow.mass_holdup / flow.surface_temperature
+        cold = f", as happens in flows as cold as M/T_surface = {coldness:.2g}" if coldness > _COLD else ""
+        super().__init__(
+            f"not known at kx = {kx:g}, ky = {ky:g}: a rate that seems to grow there changes from grid to grid up to "
+            f"degree {DEGREES[-1][1]}{cold}; take other wavenumbers, nearby ones can be known"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,11 +200,24 @@ class Disturbances:
     @property
     def smallest_rate(self) -> float:
         """Growth that counts as none: 1e-6 sqrt(g cos(theta)/h)."""
-        return NEUTRAL / float(np.sqrt(self.flow.centre_of_mass))
+        return smallest_rate(self.flow)
+
+    @property
+    def is_cold(self) -> bool:
+        """Whether M/T_surface is so large that coarse grids say little."""
+        return self.flow.mass_holdup > _COLD * self.flow.surface_temperature
 
     def candidates(self, kx: float, ky: float, level: int = 0) -> Complex:
         """Eigenvalues of the coarse grid that may be modes, fastest growing first; not yet checked on another."""
-        of = self.coarse_operator(kx, ky, level)
+        return self._candidates(self.coarse_operator(kx, ky, level), kx, ky)
+
+    def screened(self, kx: float, ky: float) -> Complex:
+        """The same on a coarser grid: rates to a few per cent where flows are not very cold, much faster."""
+        usual = self._resolutions(kx, ky, 0)[0]
+        degree = round(usual.degree * _SCREEN / DEGREES[0][0])
+        return self._candidates(self.operator(Resolution(degree, usual.reach, usual.beta)), kx, ky)
+
+    def _candidates(self, of: Operator, kx: float, ky: float) -> Complex:
         curve = self._curve(of.base.resolution, kx)
         end = curve[0]
         # To the right of everything that matters, in the middle of the range of speeds.
@@ -259,6 +290,30 @@ class Disturbances:
         return self.operator(resolution).base
 
 
+def leading(
+    disturbances: Disturbances, kx: float, ky: float, *, count: int = 1, tolerance: float = np.inf
+) -> list[Mode]:
+    """The leading modes on the first grids that tell what grows and know it to ``tolerance``, or on the finest.
+
+    Raises:
+        UnresolvedError: where the finest grids do not tell.
+    """
+    found: list[Mode] = []
+    doubtful = True
+    for level in range(len(DEGREES)):
+        found, doubtful = disturbances.accepted(kx, ky, level, count)
+        if not doubtful and (not found or found[0].error <= tolerance * max(1.0, abs(found[0].sigma))):
+            break
+    if doubtful:
+        raise UnresolvedError(disturbances.flow, kx, ky)
+    return found
+
+
+def smallest_rate(flow: Flow) -> float:
+    """Growth that counts as none: 1e-6 sqrt(g cos(theta)/h), in sqrt(g cos(theta)/d)."""
+    return NEUTRAL / float(np.sqrt(flow.centre_of_mass))
+
+
 def density_tail(of: Operator, vectors: Complex) -> Array:
     """Relative size of the last sixth of the Chebyshev coefficients of the density of each of ``vectors``."""
     density = without_top(of.base) @ vectors[: of.points]
@@ -273,6 +328,7 @@ def check_wavenumbers(kx: float, ky: float) -> None:
         InputError: where they are no finite numbers in the range that has a meaning.
     """
     for name, k in (("kx", kx), ("ky", ky)):
+        k = real(f"wavenumber {name}", k, " (in 1/d)")
         if not (np.isfinite(k) and abs(k) <= _LARGEST):
             raise InputError(f"wavenumber {name} = {k}: must be from -{_LARGEST:g} to {_LARGEST:g} (in 1/d)")
     k = np.hypot(kx, ky)

@@ -12,11 +12,12 @@ error of a point; where that is large the mode has run into the continuous spect
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from contourpy import contour_generator
+from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
@@ -53,11 +54,17 @@ class Plane(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Leading eigenvalues sigma (m, n) at coordinates ``a`` (m,) and ``b`` (n,); NaN where no mode is seen."""
+    """Leading eigenvalues sigma (m, n) at coordinates ``a`` (m,) and ``b`` (n,).
+
+    NaN where no mode is seen and the continuous spectrum leads, which decays, and where ``unresolved``: there it is not
+    known whether something grows. ``grows`` is where growth counts. Both are (m, n), or one False for all points.
+    """
 
     a: Array
     b: Array
     sigma: Complex
+    grows: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((), dtype=bool))
+    unresolved: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((), dtype=bool))
 
     @property
     def growth(self) -> Array:
@@ -102,7 +109,10 @@ def _lines(scan: Scan) -> list[Array]:
     # Where no mode is seen, the continuous spectrum leads, which decays.
     seen = np.isfinite(growth)
     level = growth if seen.all() else np.where(seen, growth, -0.1 * np.nanmax(np.abs(growth), initial=1e-300))
-    lines = contour_generator(scan.a, scan.b, level.T).lines(0.0)
+    # Nothing is crossed where it is not known what grows: lines end there, and curves are followed through.
+    lines = contour_generator(
+        scan.a, scan.b, np.ma.array(level, mask=np.broadcast_to(scan.unresolved, level.shape)).T
+    ).lines(0.0)
     return sorted((np.asarray(line) for line in lines), key=len, reverse=True)
 
 
@@ -155,6 +165,8 @@ def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
 
 
 _CLOSED = "its own beginning: it is closed"
+#: Why a curve ends that leaves the plane.
+EDGE = "the edge of the range"
 
 
 def _side(
@@ -170,7 +182,7 @@ def _side(
         if edge is not None:
             if out:
                 out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
-            return out, "the edge of the range"
+            return out, EDGE
         judged = system.judged(point.z)
         if judged.error > _ASTRAY:
             return out, "where the mode runs into the continuous spectrum"

@@ -11,15 +11,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.stability.along import flow_between
-from chuteflow.stability.modes import Disturbances, check_wavenumbers
+from chuteflow.stability.family import flow_between
+from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
-from chuteflow.stability.verdict import leading, stability_of
+from chuteflow.stability.verdict import stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -98,29 +99,33 @@ class FamilyPlane:
 
 
 def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent) -> Scan:
-    """Leading eigenvalues at ``points`` evenly spaced over ``plane``.
-
-    Raises:
-        SolveError: where the finest grids do not tell whether something grows.
-    """
+    """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not tell, that is marked."""
     a, b = (np.linspace(0.0, end, n) for end, n in zip(plane.size, points, strict=True))
     sigma = np.full(points, complex(np.nan, np.nan))
+    grows, unresolved = np.zeros(points, dtype=bool), np.zeros(points, dtype=bool)
     # Flows change with b: one after the other.
     for j, up in enumerate(b):
         for i, right in enumerate(a):
-            found = leading(*plane.wave(np.array([right, up])))
+            disturbances, kx, ky = plane.wave(np.array([right, up]))
+            try:
+                found = leading(disturbances, kx, ky)
+            except UnresolvedError:
+                unresolved[i, j] = True
+                continue
             if found:
                 sigma[i, j] = found[0].sigma
+                grows[i, j] = found[0].growth > max(disturbances.smallest_rate, found[0].error)
         progress((j + 1) / len(b))
-    return Scan(a, b, sigma)
+    return Scan(a, b, sigma, grows, unresolved)
 
 
 @dataclass(frozen=True, eq=False)
 class WaveMap:
     """Growth rates and frequencies (m, n) of the leading modes of ``flow`` over ``kx`` (m,) and ``ky`` (n,), in 1/d.
 
-    NaN where no mode is told from the continuous spectrum, which decays. Points z (k, 2) of the ``neutral`` curves
-    are kx and ky, and their errors are in 1/d.
+    NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n): there the
+    grids do not tell whether something grows. ``grows`` (m, n) is where a mode grows faster than ``smallest_rate``
+    and its error. Points z (k, 2) of the ``neutral`` curves are kx and ky, and their errors are in 1/d.
     """
 
     flow: Flow
@@ -128,6 +133,9 @@ class WaveMap:
     ky: Array
     growth: Array
     frequency: Array
+    grows: NDArray[np.bool_]
+    unresolved: NDArray[np.bool_]
+    smallest_rate: float
     neutral: tuple[NeutralCurve, ...]
 
     def __repr__(self) -> str:
@@ -139,7 +147,8 @@ class WaveMap:
 class FamilyMap:
     """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a family.
 
-    ``depth_wavenumber`` (m,) is k h with h the centre of mass, and ``flows`` (n) are those of the columns. Of each
+    ``depth_wavenumber`` (m,) is k h with h the centre of mass, and ``flows`` (n) are those of the columns. NaN,
+    ``grows`` and ``unresolved`` (m, n) are as in :class:`WaveMap`, with the ``smallest_rate`` (n) of each flow. Of each
     of the ``neutral`` curves, z (k, 2) is k h and the place along the family from 0 to 1, the error is that of
     ln(k h), and ``neutral_flows`` has the flows.
     """
@@ -149,6 +158,9 @@ class FamilyMap:
     depth_wavenumber: Array
     growth: Array
     frequency: Array
+    grows: NDArray[np.bool_]
+    unresolved: NDArray[np.bool_]
+    smallest_rate: Array
     neutral: tuple[NeutralCurve, ...]
     neutral_flows: tuple[tuple[Flow, ...], ...]
 
@@ -179,12 +191,11 @@ def wave_map(
 
     Raises:
         InputError: for wavenumbers or sizes out of range, and where stability cannot be posed.
-        SolveError: where the finest grids do not tell whether something grows.
     """
     _check_size(size)
     for name, ends in (("kx", kx), ("ky", ky)):
         if ends is not None:
-            _check_range(name, ends)
+            _check_range(name, *pair(name, ends))
     usual = _usual(flow) if kx is None or ky is None else 0.0
     ends = [(0.0, usual) if given is None else given for given in (kx, ky)]
     low, unit = [low for low, _ in ends], [high - low for low, high in ends]
@@ -198,6 +209,9 @@ def wave_map(
         low[1] + unit[1] * scan.b,
         scan.growth,
         scan.frequency,
+        scan.grows,
+        scan.unresolved,
+        plane.disturbances.smallest_rate,
         tuple(scaled),
     )
 
@@ -223,7 +237,6 @@ def family_map(
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
-        SolveError: where the finest grids do not tell whether something grows.
     """
     _check_size(size)
     if len(flows) < 2:
@@ -231,20 +244,23 @@ def family_map(
     angle = number("angle", angle)
     if not 0.0 <= angle <= 90.0:
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
-    depth_wavenumber = pair("depth_wavenumber", depth_wavenumber)
-    if not 0.0 < depth_wavenumber[0] < depth_wavenumber[1] <= _LARGEST_DEPTH_WAVENUMBER:
-        low, high = depth_wavenumber
+    low, high = pair("depth_wavenumber", depth_wavenumber)
+    if not 0.0 < low < high <= _LARGEST_DEPTH_WAVENUMBER:
         raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
-    low, high = np.log(depth_wavenumber)
+    low, high = np.log((low, high))
     plane = FamilyPlane(flows, float(np.radians(angle)), float(low), float(high - low))
     scan = scanned(plane, size, progress)
     curves = neutral_curves(plane, scan)
+    columns = tuple(plane.flow(float(place)) for place in scan.b)
     return FamilyMap(
-        flows=tuple(plane.flow(float(place)) for place in scan.b),
+        flows=columns,
         angle=angle,
         depth_wavenumber=np.exp(low + (high - low) * scan.a),
         growth=scan.growth,
         frequency=scan.frequency,
+        grows=scan.grows,
+        unresolved=scan.unresolved,
+        smallest_rate=np.array([smallest_rate(flow) for flow in columns]),
         neutral=tuple(
             replace(
                 c, z=np.stack([np.exp(low + (high - low) * c.z[:, 0]), c.z[:, 1]], axis=1), error=c.error * plane.unit
@@ -258,7 +274,7 @@ def family_map(
 def _usual(flow: Flow) -> float:
     """Three times the wavenumber of the fastest growing mode, or 1/h where none grows."""
     found = stability_of(flow)
-    if found.stable or found.mode is None or found.mode.direction == "uniform":
+    if not found.grows or found.mode is None or found.mode.direction == "uniform":
         return 1.0 / flow.centre_of_mass
     return 3.0 * float(np.hypot(found.mode.kx, found.mode.ky))
 
@@ -267,8 +283,8 @@ def _check_size(size: tuple[int, int]) -> None:
     checked_size(size, 4, _MOST_POINTS)
 
 
-def _check_range(name: str, ends: tuple[float, float]) -> None:
-    for k in ends:
+def _check_range(name: str, low: float, high: float) -> None:
+    for k in (low, high):
         check_wavenumbers(*((k, 0.0) if name == "kx" else (0.0, k)))
-    if not ends[0] < ends[1]:
-        raise InputError(f"{name} from {ends[0]:g} to {ends[1]:g}: the range must rise")
+    if not low < high:
+        raise InputError(f"{name} from {low:g} to {high:g}: the range must rise")

@@ -13,6 +13,7 @@ from chuteflow.checks import number
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.layer import FIELDS, Layer
+from chuteflow.stability.modes import Disturbances, UnresolvedError, leading
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -41,7 +42,10 @@ class Outcome:
 
     ``distance`` is the largest relative difference in Q, h and T at the base from the nearest of ``steady``, and
     ``nearest`` its index; ``rate`` is that at which the logarithm of the distance changed in the last fifth of the
-    time: negative where the flow approaches.
+    time: negative where the flow approaches. At late times that is no rate of a mode: what is left then belongs to the
+    continuous spectrum, which touches zero, and its slowest part on the grid of the integration depends on the grid.
+    ``leading`` is the growth rate of the leading discrete mode of the nearest flow that is the same all along the
+    chute, the mass mode set apart; None where none is told.
     """
 
     steady: tuple[Flow, ...]
@@ -49,6 +53,7 @@ class Outcome:
     distance: float
     rate: float
     arrested: bool
+    leading: float | None = None
 
 
 def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERANCE) -> Iterator[Moment]:
@@ -106,7 +111,16 @@ def outcome(layer: Layer, moments: Sequence[Moment]) -> Outcome:
     earlier, passed = _distance(before, steady[nearest]), last.time - before.time
     moved = earlier > 0.0 and distances[nearest] > 0.0 and passed > 0.0
     rate = np.log(distances[nearest] / earlier) / passed if moved else 0.0
-    return Outcome(steady, nearest, distances[nearest], float(rate), arrested)
+    return Outcome(steady, nearest, distances[nearest], float(rate), arrested, leading_rate(steady[nearest]))
+
+
+def leading_rate(flow: Flow) -> float | None:
+    """Growth rate of the leading discrete mode of ``flow`` at k = 0 but for the mass mode; None where none is told."""
+    try:
+        found = leading(Disturbances(flow), 0.0, 0.0, count=2)
+    except UnresolvedError:
+        return None
+    return next((mode.growth for mode in found if mode.kind != "mass"), None)
 
 
 def _distance(moment: Moment, flow: Flow) -> float:

@@ -34,7 +34,7 @@ def judged(flow: Flow) -> tuple[dict[str, float], str | None]:
         found = stability_of(flow)
     except ChuteflowError as error:
         return {}, str(error)
-    out = {"stable": float(found.stable)}
+    out = {} if found.stable is None else {"stable": float(found.stable)}
     if found.mode is not None:
         out |= {
             "mode": float(JUDGED_KINDS["mode"].index(found.mode.direction)),
@@ -42,4 +42,6 @@ def judged(flow: Flow) -> tuple[dict[str, float], str | None]:
             "kx": found.mode.kx,
             "ky": found.mode.ky,
         }
-    return out, None
+    if found.stable is not None:
+        return out, None
+    return out, f"whether something grows is not told at {len(found.unresolved)} wavenumbers, and nothing else grows"

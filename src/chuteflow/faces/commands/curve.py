@@ -49,10 +49,11 @@ def command(**given: Any) -> None:
 
         content = contract.curve_object(found, scales)
         if judged is not None:
-            from chuteflow.faces.stability_curve import samples_objects
+            from chuteflow.faces.stability_curve import changes_objects, samples_objects
 
-            for branch, samples in zip(content["branches"], samples_objects(judged, scales), strict=True):
-                branch["stability"] = samples
+            objects = samples_objects(judged, scales), changes_objects(judged, scales)
+            for branch, samples, changes in zip(content["branches"], *objects, strict=True):
+                branch["stability"], branch["stability_changes"] = samples, changes
         answer = contract.text(content)
     else:
         answer = "\n".join(_report(found, judged, scales))
@@ -107,10 +108,12 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
     """Stable and unstable stretches of a family in words."""
-    from chuteflow.faces.stability_curve import stretch
+    from chuteflow.faces.stability_curve import change_words, stretch
 
     said = [stretch(run, found.chute, scales) for run in branch.runs]
-    return f"stability, by {len(branch.samples)} flows: " + "; ".join(said)
+    ends = [change_words(change, found.chute, scales) for change in branch.changes]
+    lines = [f"stability, by {len(branch.samples)} flows: " + "; ".join(said)]
+    return "\n".join([*lines, *(["ends of stable ranges: " + "; ".join(ends)] if ends else [])])
 
 
 def _points(branch: Branch, found: Curve, scales: Scales | None) -> str:

@@ -105,6 +105,15 @@ def clear() -> None:
         click.echo("\r\x1b[K", nl=False, err=True)
 
 
+def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
+    """At how many points of a map no mode is told, and at how many it is not known whether something grows."""
+    hidden = int((np.isnan(growth) & ~unresolved).sum())
+    if hidden:
+        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+    if unresolved.any():
+        yield f"not known at {int(unresolved.sum())} points: the finest grids do not tell whether something grows there"
+
+
 def _report(found: WaveMap) -> Iterator[str]:
     from chuteflow.faces import tables, words
 
@@ -114,14 +123,16 @@ def _report(found: WaveMap) -> Iterator[str]:
     yield ""
     growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
     i, j = np.unravel_index(int(growth.argmax()), growth.shape)
+    if np.isfinite(growth[i, j]):
+        yield (
+            f"largest growth on the map: {tables.number(float(growth[i, j]))} at kx = "
+            f"{tables.number(float(found.kx[i]))}, ky = {tables.number(float(found.ky[j]))}"
+        )
     yield (
-        f"largest growth on the map: {tables.number(float(growth[i, j]))} at kx = {tables.number(float(found.kx[i]))}, "
-        f"ky = {tables.number(float(found.ky[j]))}"
+        f"growing: {int(found.grows.sum())} of {growth.size} points; growth below {found.smallest_rate:.2g} or below "
+        "its error counts as none"
     )
-    yield f"growing: {int((growth > 0.0).sum())} of {growth.size} points"
-    hidden = int(np.isnan(found.growth).sum())
-    if hidden:
-        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+    yield from hidden_and_unresolved(found.growth, found.unresolved)
     yield ""
     if not found.neutral:
         yield "no neutral curve in this range"

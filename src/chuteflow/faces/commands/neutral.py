@@ -11,7 +11,7 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.faces.commands.growth import SAVED, Size, clear, progress, write
+from chuteflow.faces.commands.growth import SAVED, Size, clear, hidden_and_unresolved, progress, write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,14 +93,29 @@ def _report(found: FamilyMap) -> Iterator[str]:
         f"k h from {low} to {high}"
     )
     yield ""
+    yield f"growing: {int(found.grows.sum())} of {found.growth.size} points"
+    yield from hidden_and_unresolved(found.growth, found.unresolved)
     if not found.neutral:
-        yield "no neutral curve: all waves of this range " + ("grow" if (found.growth > 0.0).all() else "decay")
+        yield f"no neutral curve: {_without(found)}"
         return
+    yield ""
     for number, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True), 1):
         yield f"neutral curve {number}, {len(flows)} points, error of ln(k h) at most {curve.error.max():.0e}"
         yield f"it begins at {curve.ends[0]}, and ends at {curve.ends[1]}"
         yield tables.table([["k h", "Q", "h", "T_surface"], *_rows(curve.z[:, 0].tolist(), flows)])
         yield ""
+
+
+def _without(found: FamilyMap) -> str:
+    """What the waves of the map do, as far as it is known."""
+    known = "all waves of this range" if not found.unresolved.any() else "all waves of this range that are known"
+    if found.grows.all(where=~found.unresolved):
+        return f"{known} grow"
+    return (
+        f"none is followed between the {int(found.grows.sum())} points that grow and the others"
+        if (found.grows.any())
+        else f"{known} decay"
+    )
 
 
 def _place(flow: Flow) -> str:

@@ -125,6 +125,7 @@ def _content(flow: Flow, moments: Sequence[Moment], end: Outcome) -> dict[str, A
         "nearest": end.nearest,
         "distance": end.distance if end.nearest is not None else None,
         "rate": end.rate,
+        "leading": end.leading,
         "arrested": end.arrested,
     }
 
@@ -155,7 +156,12 @@ def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
     away = f"{100.0 * end.distance:.2g} % away"
     if end.distance < _SETTLED:
         return f"it has come to {name}: {away} at t = {number(last.time)}"
-    pace = f"the distance changes at the rate {number(end.rate)}"
+    pace = f"the distance changed at the rate {number(end.rate)} in the last fifth of the time"
+    if end.leading is not None:
+        pace += (
+            f" (the leading discrete mode of that flow has the rate {number(end.leading)}; what is slower "
+            "belongs to the continuous spectrum and depends on the grid)"
+        )
     if end.distance < _ARRIVED and end.rate < 0.0:
         return f"it comes to {name}: {away} at t = {number(last.time)}, and {pace}"
     return (

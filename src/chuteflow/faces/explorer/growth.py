@@ -46,6 +46,8 @@ def verdict(flow: Flow) -> Verdict:
     smallest, largest = found.searched
     searched = 2.0 * math.pi / largest, 2.0 * math.pi / smallest
     mode = found.mode
+    if found.stable is None:
+        return Verdict("unknown", searched, reason=f"{len(found.unresolved)} wavenumbers are not resolved")
     if found.stable or mode is None:
         return Verdict("stable", searched)
     k = math.hypot(mode.kx, mode.ky)
