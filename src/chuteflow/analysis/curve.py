@@ -7,7 +7,7 @@ them whole, or followed through folds in Q, M and T_surface by the general conti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import TOLERANCE, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 
 #: Quantities whose folds are located.
 _FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
@@ -100,7 +100,7 @@ def _folds(chute: Chute, family: TracedFamily, stretch: Stretch, tolerance: floa
     found = turns(path, tuple(_FOLDS.values()), tolerance)
     for kind, which in _FOLDS.items():
         for turn in (turn for turn in found if turn.which == which):
-            yield kind, Flow(chute, turn.solution), float(np.interp(turn.place, np.arange(len(at)), at))
+            yield kind, Flow(chute, turn.solution), _arclength(path, at, int(turn.place), turn.solution)
 
 
 def _changes(
@@ -123,7 +123,13 @@ def _changes(
                 found = _pair(flows[i], flows[i + 1], quantity, ways[i], tolerance)
             else:
                 continue
-            yield from ((kind, flow, at[i] + share * (at[i + 1] - at[i])) for share, flow in found)
+            yield from ((kind, flow, _arclength(path, at, i, flow.solution)) for flow in found)
+
+
+def _arclength(path: Sequence[Solution], at: Array, i: int, solution: Solution) -> float:
+    """The arclength of a flow between the flows i and i + 1 of a path, which have the arclengths ``at``."""
+    share = Chord(path[i], path[i + 1]).place(solution)
+    return float(at[i] + np.clip(share, 0.0, 1.0) * (at[i + 1] - at[i]))
 
 
 def _reaches(dip: Dip, values: Array) -> bool:
@@ -131,24 +137,22 @@ def _reaches(dip: Dip, values: Array) -> bool:
     return bool(dip.zeros) or abs(dip.value) < 0.5 * float(np.abs(values[dip.step : dip.step + 2]).max())
 
 
-def _pair(
-    first: Flow, last: Flow, quantity: Callable[[Flow], float], share: float, tolerance: float
-) -> list[tuple[float, Flow]]:
+def _pair(first: Flow, last: Flow, quantity: Callable[[Flow], float], share: float, tolerance: float) -> list[Flow]:
     """The two zeros to either side of a share of the chord between two flows, if the sign is another one there."""
     middle = Flow(first.chute, Chord(first.solution, last.solution, tolerance).at(share))
     values = quantity(first), quantity(middle), quantity(last)
     if (values[0] > 0.0) == (values[1] > 0.0):
         return []
-    (one, before) = _zero(first, middle, quantity, values[:2], tolerance)
-    (two, after) = _zero(middle, last, quantity, values[1:], tolerance)
-    return [(share * one, before), (share + (1.0 - share) * two, after)]
+    return [
+        _zero(first, middle, quantity, values[:2], tolerance),
+        _zero(middle, last, quantity, values[1:], tolerance),
+    ]
 
 
 def _zero(
     first: Flow, last: Flow, quantity: Callable[[Flow], float], ends: tuple[float, float], tolerance: float
-) -> tuple[float, Flow]:
-    """Where a quantity vanishes between two flows: the share of the chord, and the flow."""
+) -> Flow:
+    """The flow between two at which a quantity vanishes."""
     chute = first.chute
     chord = Chord(first.solution, last.solution, tolerance)
-    flow = Flow(chute, chord.zero(lambda s: quantity(Flow(chute, s)), ends))
-    return float(np.clip(chord.place(flow.solution), 0.0, 1.0)), flow
+    return Flow(chute, chord.zero(lambda s: quantity(Flow(chute, s)), ends))
