@@ -22,6 +22,8 @@ NEAR = 0.02
 _TOO_NEAR, _BLUR = 0.08, 2e-3
 #: A flow found from a bracket lies within this many of its lengths, and a little.
 _BESIDE, _ROUGH = 1.0, 0.1
+#: The temperature is held at the end of a family where it changes by more than this along it.
+_STEEP = 0.2
 #: Flows whose ln M and ln T_surface differ by less are one flow.
 _SAME = 1e-7
 #: A flow solved at a fixed quantity is that of its bracket if it is so near to the one found along the branch.
@@ -141,7 +143,7 @@ def _with_turns(path: _Path, which: int, target: float) -> _Path:
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         # Steps first to last-1 lie between the knots first to last.
         out += knots[begin : kept[first]]
-        stretch = solved_path([knots[i] for i in kept[first : last + 1]])
+        stretch = solved_path([knots[i] for i in kept[first : last + 1]], (first == 0, last == len(kept) - 1))
         stops = followed(stretch, (which,))
         exact = [Knot.at(stop.solution) for stop in stops]
         found += [knot for stop, knot in zip(stops, exact, strict=True) if stop.which is not None]
@@ -175,11 +177,18 @@ def _near_turns(macroscopic: Array, which: int, target: float) -> NDArray[np.boo
     return wanted | beside[2:] | beside[:-2]
 
 
-def solved_path(knots: Sequence[Knot]) -> list[Solution]:
-    """The knots solved, each in the plane through it across the path; those that cannot be are left out."""
+def solved_path(knots: Sequence[Knot], at_edge: tuple[bool, bool] = (False, False)) -> list[Solution]:
+    """The knots solved, each in the plane through it across the path; those that cannot be are left out.
+
+    A family begins and ends with the first and last temperature searched: there (``at_edge``) that is held, so that
+    nothing is lost beside an end that is rough.
+    """
     plane = np.array([knot.macroscopic[LOG_M:] for knot in knots])
     ahead = directions(plane) if len(knots) > 1 else np.array([[1.0, 0.0]])
     conditions = [Condition.plane(along, knot.macroscopic) for along, knot in zip(ahead, knots, strict=True)]
+    for i, edge in zip((0, -1), at_edge, strict=True):
+        if edge and abs(ahead[i, 1]) > _STEEP:
+            conditions[i] = Condition.fix(LOG_T, float(np.exp(knots[i].macroscopic[LOG_T])))
     rough = [i for i, knot in enumerate(knots) if knot.exact is None]
     together = solve_many([knots[i].start(_STARTS[0]) for i in rough], [conditions[i] for i in rough])
     out: list[Solution] = []
