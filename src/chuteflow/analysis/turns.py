@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.chords import Chord
+from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation
@@ -286,11 +287,19 @@ def _between(
                 if turn is not None:
                     yield Stop(begin + (end - begin) * turn[0], turn[1], quantity)
             return
-    middle, halfway = chord.at(0.5), 0.5 * (begin + end)
+    middle, halfway = _middle(chord, first.solution, last.solution, tolerance), 0.5 * (begin + end)
     yield Stop(halfway, middle)
     (between,) = expansions([middle], _unit(chord))
     yield from _between(first, between, which, tolerance, (begin, halfway))
     yield from _between(between, last, which, tolerance, (halfway, end))
+
+
+def _middle(chord: Chord, first: Solution, last: Solution, tolerance: float) -> Solution:
+    """The flow half-way along a chord; along the one in the plane of ln M and ln T_surface where that is not found."""
+    try:
+        return chord.at(0.5)
+    except SolveError:
+        return Chord(first, last, tolerance).at(0.5)
 
 
 @dataclass(frozen=True)
