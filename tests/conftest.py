@@ -1,6 +1,12 @@
-"""Flows that several tests look at."""
+"""Flows, and built sites of the documentation, that several tests look at."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 import chuteflow
 from chuteflow.stability.modes import Disturbances
@@ -18,3 +24,47 @@ def three():
 def disturbances(three):
     """The disturbances of A, B and C."""
     return {name: Disturbances(flow) for name, flow in three.items()}
+
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+#: The build of the documentation in a process whose sockets lead nowhere.
+BUILD = """
+import socket, sys
+
+def refuse(*_):
+    raise OSError("no network")
+
+socket.socket.connect = socket.socket.connect_ex = socket.getaddrinfo = refuse
+from sphinx.cmd.build import main
+
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def built(tmp_path_factory, name, *options):
+    """The site, built by the first that asks for it; any warning fails."""
+    # The workers of pytest-xdist have their folders side by side.
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if os.environ.get("PYTEST_XDIST_WORKER") else folder
+    site, done = folder / name, folder / f"{name}.done"
+    with FileLock(folder / f"{name}.lock"):
+        if not done.exists():
+            arguments = ["--quiet", "--fail-on-warning", "--keep-going", *options, DOCS, site]
+            build = subprocess.run(
+                [sys.executable, "-c", BUILD, *arguments], capture_output=True, text=True, check=False
+            )
+            assert build.returncode == 0, build.stderr
+            done.touch()
+    return site
+
+
+@pytest.fixture(scope="session")
+def quick_site(tmp_path_factory):
+    """The site without pictures, source code and all claims but one."""
+    return built(tmp_path_factory, "quick-site", "-t", "quick")
+
+
+@pytest.fixture(scope="session")
+def whole_site(tmp_path_factory):
+    """The site as it is published."""
+    return built(tmp_path_factory, "whole-site")

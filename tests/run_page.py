@@ -99,7 +99,7 @@ def _equal(shown: str, written: str) -> bool:
 
 def main(page: Path) -> None:
     """Run the page, and end with a message where an example fails or writes something else."""
-    names: dict[str, object] = {"__name__": "__page__"}
+    names: dict[str, object] = {"__name__": "__main__"}  # as a script that a reader runs
     sys.path.insert(0, str(Path.cwd()))
     for example in examples(page.read_text(encoding="utf-8")):
         written = run(example, names, str(page))

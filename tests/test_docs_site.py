@@ -1,8 +1,6 @@
 """The documentation builds without network, loads nothing from outside, and links every equation to code."""
 
 import re
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -14,29 +12,9 @@ with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(DOCS / "_ext")
     docstrings, equations, offline = map(import_module, ("docstrings", "equations", "offline"))
 
-#: The build in a process whose sockets lead nowhere.
-BUILD = """
-import socket, sys
-
-def refuse(*_):
-    raise OSError("no network")
-
-socket.socket.connect = socket.socket.connect_ex = socket.getaddrinfo = refuse
-from sphinx.cmd.build import main
-
-sys.exit(main(sys.argv[1:]))
-"""
 #: Numbers of the equations of the paper.
 PAPER = [f"{section}.{number}" for section, last in ((2, 16), (3, 32), (4, 27)) for number in range(1, last + 1)]
 PAPER += ["A1", "A2"]
-
-
-def built(folder, *options):
-    """The site in ``folder``; any warning fails."""
-    arguments = ["--quiet", "--fail-on-warning", "--keep-going", *options, DOCS, folder]
-    done = subprocess.run([sys.executable, "-c", BUILD, *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return folder
 
 
 def checked(site):
@@ -57,13 +35,13 @@ def checked(site):
     assert re.search(r'src="\.\./_static/[^"]*mathjax[^"]*"', model, re.IGNORECASE)
 
 
-def test_the_site_builds_without_network(tmp_path):
-    checked(built(tmp_path / "site", "-t", "quick"))
+def test_the_site_builds_without_network(quick_site):
+    checked(quick_site)
 
 
 @pytest.mark.slow
-def test_the_whole_site_builds_without_network(tmp_path):
-    site = built(tmp_path / "site")
+def test_the_whole_site_builds_without_network(whole_site):
+    site = whole_site
     checked(site)
     figures = (site / "figures.html").read_text(encoding="utf-8")
     assert len(re.findall(r"<img[^>]*figure_\d\d\.png", figures)) == 17

@@ -53,6 +53,17 @@ def test_versions_agree():
     assert re.findall(r"^version: *(\S+)$", citation, re.MULTILINE) == [project["version"]]
 
 
+# The checks
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the checks are a script of bash")
+@pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["-h"], 0), (["tests"], 2), (["--fast", "x"], 2)])
+def test_the_checks_take_no_arguments(arguments, code):
+    done = subprocess.run([ROOT / ".ci/run", *arguments], capture_output=True, text=True, check=False, timeout=10)
+    assert done.returncode == code
+    assert len((done.stdout + done.stderr).splitlines()) == 1
+
+
 # The layers
 
 

@@ -112,7 +112,9 @@ class Equation(SphinxDirective):
         number = self.arguments[0]
         shown = f"({number})"
         formula = "\n".join(self.content).strip()
-        block = nodes.math_block(formula, rf"{formula} \tag{{{number}}}", nowrap=False, number=None, label=None)
+        # Sphinx sets lines in an environment that takes no tag; here the number belongs to the whole.
+        tagged = rf"\[{formula} \tag{{{number}}}\]"
+        block = nodes.math_block(formula, tagged, nowrap=True, number=None, label=None)
         whole = nodes.container("", block, ids=[label(number)], classes=["equation"])
         self.env.domains.standard_domain.note_hyperlink_target(label(number), self.env.docname, label(number), shown)
         whole += self._beside(shown)

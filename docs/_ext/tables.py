@@ -10,7 +10,9 @@ from sphinx.application import Sphinx
 
 from chuteflow.analysis.results import KINDS
 from chuteflow.paper.claims import CLAIMS, VERDICTS, check, shown
-from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity
+from chuteflow.steady import names
+from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity
+from chuteflow.steady.validity import WORDS
 from chuteflow.theory.laws import LAWS
 
 #: What the exponents of a quantity's dimension belong to.
@@ -18,14 +20,18 @@ _SCALES = (r"\rho_p", "d", r"(g\cos\theta)")
 
 
 class Quantities(FromPackage):
-    """The registry of quantities: ``numbers`` of a flow, or ``fields`` of a profile."""
+    """The registry of quantities: ``numbers`` of a flow, ``fields`` of a profile, or those of its ``validity``."""
 
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         """The table."""
         self.note_package()
-        chosen: Mapping[str, Quantity] = {"numbers": NUMBERS, "fields": FIELDS}[self.arguments[0]]
+        chosen: Mapping[str, Quantity] = {
+            "numbers": NUMBERS,
+            "fields": FIELDS,
+            "validity": VALIDITY,
+        }[self.arguments[0]]
         rows = [
             (
                 f"`{q.name}`",
@@ -64,6 +70,30 @@ class Closures(FromPackage):
         self.note_package()
         rows = [(f"`{law.name}`", law.description, law.source, f"{law.densest:g}") for law in LAWS.values()]
         return [self.table(("name", "what", "source", r"$\nu^*$"), rows, (15, 50, 25, 10))]
+
+
+class Names(FromPackage):
+    """The limits by which flows are named."""
+
+    def run(self) -> list[nodes.Node]:
+        """The table."""
+        self.note_package()
+        number = {name: f"`{NUMBERS[name].symbol}`" for name in names.LIMITS}
+        rows = [
+            (number[name], f"{low} below {least:g}", middle or "no word", f"{high} from {most:g}")
+            for name, ((least, most), (low, middle, high)) in names.LIMITS.items()
+        ]
+        return [self.table(("number", "small", "between", "large"), rows, (25, 25, 25, 25))]
+
+
+class Validity(FromPackage):
+    """The words that tell which limits of the theory are passed."""
+
+    def run(self) -> list[nodes.Node]:
+        """The table."""
+        self.note_package()
+        rows = [(word, meaning) for word, meaning in WORDS.items()]
+        return [self.table(("word", "where"), rows, (30, 70))]
 
 
 class SpecialPoints(FromPackage):
@@ -108,6 +138,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directives."""
     app.add_directive("quantities", Quantities)
     app.add_directive("closures", Closures)
+    app.add_directive("names", Names)
+    app.add_directive("validity", Validity)
     app.add_directive("special-points", SpecialPoints)
     app.add_directive("claims", Claims)
     return {"parallel_read_safe": True}

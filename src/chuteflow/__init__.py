@@ -1,4 +1,4 @@
-"""Every steady flow of grains that an inclined chute can carry."""
+"""Steady flows of grains down an inclined chute: all that a search of a stated range finds, each with its error."""
 
 from __future__ import annotations
 

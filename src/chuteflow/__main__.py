@@ -1,8 +1,25 @@
-"""``python -m chuteflow``: the command line."""
+"""``python -m chuteflow`` and ``chuteflow``: the command line."""
 
 import sys
 
-from chuteflow.faces.cli import main
+
+def run() -> int:
+    """Run the command line on the arguments of this process, and return its exit code.
+
+    Interrupts are taken care of before anything large is imported, and up to the end of the process.
+    """
+    try:
+        from chuteflow.faces import interrupts
+
+        with interrupts.Interrupts(to_the_end=True):
+            from chuteflow.faces.cli import main
+
+            return main()
+    except KeyboardInterrupt:
+        from chuteflow.faces import interrupts
+
+        return interrupts.tell()
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run())

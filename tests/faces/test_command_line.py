@@ -54,6 +54,27 @@ def test_solve_json(capsys):
         assert flow["error"] == wanted.error <= 1e-10
 
 
+def test_the_table_tells_the_depth_from_the_centre_of_mass(capsys):
+    _, out, _ = run(capsys, "solve", *PAPER, "--centre-of-mass", "39.448")
+    header, row = (line.split() for line in out.splitlines()[2:4])
+    assert row[1 + header.index("h")] == "39.448"
+    assert float(row[1 + header.index("depth")]) > 150.0
+    assert "depth: the height above which nu is below 1 % of nu_max; the centre of mass is h" in out
+
+
+def test_the_table_and_the_object_have_names_and_validity(capsys):
+    _, out, _ = run(capsys, "solve", *PAPER, "--flux", "3")
+    rows = out.splitlines()[2:6]
+    assert rows[0].endswith("validity")
+    assert [row.partition("e-12  ")[2] for row in rows[1:]] == ["large slip, rarefied"] * 2 + ["large slip"]
+    _, out, _ = run(capsys, "solve", *PAPER, "--flux", "3", "--json")
+    for flow, wanted in zip(json.loads(out)["flows"], flows(CHUTE, Q=3.0), strict=True):
+        assert flow["name"] == wanted.name
+        assert flow["validity"]["words"] == list(wanted.validity.words)
+        assert flow["validity"]["nu_max"] == wanted.largest_volume_fraction
+        assert flow["validity"]["slip_ratio"] == wanted.validity.slip_ratio
+
+
 def test_curve_json(capsys):
     code, out, _ = run(capsys, "curve", *PAPER, "--json")
     assert code == 0
@@ -64,12 +85,21 @@ def test_curve_json(capsys):
     assert branch["Q"] == wanted.mass_flux.tolist()
     assert branch["T_surface"] == wanted.surface_temperature.tolist()
     assert len(branch["h"]) == len(branch["M"]) == len(branch["Q"])
+    assert branch["validity"]["packing"] == [flow.validity.packing for flow in wanted.flows]
+    assert branch["validity"]["words"][-1] == ["packed: beyond the theory", "large slip"]
     assert [point["kind"] for point in branch["special"]] == ["fold-Q", "density-inversion", "fold-Q"]
     assert set(branch["special"][0]) >= {"kind", "Q", "h", "M", "T_surface"}
 
 
 @pytest.mark.parametrize(
-    ("condition", "quantity"), [("--flux", "Q"), ("--holdup", "M"), ("--depth", "h"), ("--temperature", "T_surface")]
+    ("condition", "quantity"),
+    [
+        ("--flux", "Q"),
+        ("--holdup", "M"),
+        ("--centre-of-mass", "h"),
+        ("--depth", "h"),
+        ("--temperature", "T_surface"),
+    ],
 )
 def test_every_condition(capsys, condition, quantity):
     code, out, _ = run(capsys, "solve", *PAPER, condition, "1.3", "--json")
@@ -136,8 +166,10 @@ def test_plot_and_save(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["solve", *PAPER], "missing one of --flux, --holdup, --depth and --temperature"),
+        (["solve", *PAPER], "missing one of --flux, --holdup, --centre-of-mass and --temperature"),
         (["solve", *PAPER, "--flux", "3", "--holdup", "1"], "--flux 3 and --holdup 1: give one"),
+        (["solve", *PAPER, "--flux", "3", "--depth", "1"], "--flux 3 and --centre-of-mass 1: give one"),
+        (["solve", *PAPER, "--centre-of-mass", "3", "--depth", "1"], "--centre-of-mass is given 2 times"),
         (["solve", *PAPER, "--flux", "three"], "--flux 'three'"),
         (["solve", *PAPER, "--flux", "-3"], "Q = -3"),
         (["solve", *PAPER, "--flux", "nan"], "Q = nan"),

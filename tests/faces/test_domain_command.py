@@ -124,7 +124,7 @@ def test_the_picture_names_what_is_there(found):
     (legend,) = figure.legends
     said = " ".join(text.get_text() for text in legend.get_texts())
     assert "F_{21} = 0" in said
-    assert "T_s = 10" in said
+    assert r"T_{\mathrm{surface}} = 10" in said
     number, kind = figure.axes
     assert number.get_xlim() == (0.7, 0.9)
     labels = {text.get_text() for text in number.texts}

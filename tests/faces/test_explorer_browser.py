@@ -2,9 +2,10 @@
 
 import re
 import shutil
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 from xml.etree import ElementTree
 
 import pytest
@@ -58,6 +59,8 @@ def opened(page, query=""):
     page.goto(f"/{query}")
     expect(page.locator("#says")).not_to_be_empty()
     expect(page.locator("#count")).not_to_be_empty()
+    # Panels that have grown are drawn once more.
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
     return page
 
 
@@ -146,7 +149,6 @@ def test_an_address_with_what_there_is_not(page):
     expect(page.locator("#map-y")).to_have_value("roughness")
     page.goto("/?slope=steep")
     expect(page.locator("#failure")).to_contain_text("slope = 'steep': must be a number")
-    page.troubles.clear()  # the browser reports what the server refused
 
 
 def test_a_flow_is_chosen_by_its_point_and_by_the_keyboard(page):
@@ -181,7 +183,207 @@ def test_typed_values_and_angles(page):
     page.locator("#e").fill("0.8")
     page.locator("#e").press("Enter")
     expect(page.locator("#failure")).to_be_hidden()
-    page.troubles.clear()  # the browser reports the refusal of e = 1.5
+
+
+@pytest.mark.parametrize("names", [("slope", "e", "ew", "roughness", "Q", "angle"), ("d", "rho", "Q")])
+def test_any_value_can_be_typed_and_taken_back(page, names):
+    opened(page, "?si=1" if "d" in names else "")
+    failure, says = page.locator("#failure"), page.locator("#says").inner_text()
+    for name in names:
+        field = page.locator(f"#{name}")
+        before = field.input_value()
+        for value in ("0", "-1", "1e308", "", "1e-", "2"):
+            field.fill("")
+            field.press_sequentially(value)
+            field.press("Enter")
+            # The page is not blocked, and says what is wrong on one line or shows what holds.
+            assert page.evaluate("1 + 1") == 2
+            if value in ("", "1e-"):
+                expect(failure).to_contain_text("must be ")
+            elif value == "-1":
+                expect(failure).to_be_visible()
+        field.fill(before)
+        field.press("Enter")
+        expect(failure).to_be_hidden()
+        expect(page.locator("#says")).to_have_text(says)
+    expect(page.locator("main")).not_to_have_class("of-before")
+
+
+def place_of(route):
+    """The place of the column of the map that is asked for."""
+    return float(parse_qs(urlsplit(route.request.url).query)["place"][0])
+
+
+def test_both_ends_of_every_slider(page):
+    opened(page)
+    for name in ("slope", "e", "ew", "roughness", "Q"):
+        for key in ("Home", "End"):
+            page.locator(f"#{name}-slider").press(key)
+            page.wait_for_timeout(100)
+    expect(page.locator("#words")).to_have_attribute("aria-busy", "false")
+
+
+@pytest.mark.parametrize("query", ["Q=0", "Q=1e999", "slope=NaN&si=1", "si=1&d=0&rho=x", "roughness=nan&x=e"])
+def test_any_address_is_drawn_or_refused(page, query):
+    page.goto(f"/?{query}")
+    expect(page.locator("#failure")).to_be_visible()
+    if query.startswith("Q"):
+        expect(page.locator("#count")).to_contain_text("3 for Q from")
+
+
+def test_a_message_goes_with_what_it_was_about(page):
+    def column(route):
+        if parse_qs(urlsplit(route.request.url).query)["e"] == ["2"]:
+            route.continue_()
+            return
+        parts = {name: {"stops": [], "values": [1]} for name in ("most", "families", "interior", "density", "hot")}
+        at = 0.05 + 0.65 * place_of(route)
+        route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
+
+    page.unroute("**/ask/map?*")
+    page.route("**/ask/map?*", column)
+    opened(page)
+    expect(page.locator("#map-key")).to_contain_text("At most this many flows")
+    page.locator("#e").fill("2")
+    page.locator("#e").press("Enter")
+    expect(page.locator("#failure")).to_contain_text("restitution e = 2")
+    expect(page.locator("#map-key")).to_have_text("No map of this chute.")
+    page.locator("#e").fill("0.8")
+    page.locator("#e").press("Enter")
+    expect(page.locator("#map-key")).to_contain_text("At most this many flows")
+    expect(page.locator("body")).not_to_contain_text("e = 2")
+    expect(page.locator("#failure")).to_be_hidden()
+
+
+def test_what_takes_too_long_is_said_and_nothing_of_before_is_shown(page):
+    opened(page)
+    left_out = {"error": "left out: no time", "flows": [], "chute": {"slope": 0.31}}
+    left_out["recipes"] = {"command": "chuteflow solve --slope 0.31", "python": "import chuteflow"}
+    page.route("**/ask/flows?*", lambda route: route.fulfill(json=left_out | {"status": 422}))
+    page.route("**/ask/curve?*", lambda route: route.fulfill(json={"error": "no curve: no time", "status": 422}))
+    page.locator("#slope").fill("0.31")
+    page.locator("#slope").press("Enter")
+    expect(page.locator("#says")).to_have_text("Left out: no time.")
+    expect(page.locator("#curve-words")).to_have_text("No curve: no time.")
+    expect(page.locator("#flows label")).to_have_count(0)
+    expect(page.locator("#curve .line, #profiles .line, #budget .line")).to_have_count(0)
+    expect(page.locator("#command")).to_have_text("chuteflow solve --slope 0.31")
+    expect(page.locator("#failure")).to_be_hidden()
+
+
+def test_a_server_without_room_is_asked_again_for_a_while(page):
+    opened(page)
+    times = []
+
+    def refuse(route):
+        times.append(1)
+        if len(times) < 3:
+            route.fulfill(json={"error": "ask again", "status": 503})
+        else:
+            route.continue_()
+
+    page.route("**/ask/flows?*", refuse)
+    page.locator("#Q").fill("2")
+    page.locator("#Q").press("Enter")
+    expect(page.locator("#says")).to_contain_text("One flow carries the flux Q = 2")
+    page.troubles.clear()
+
+
+def test_flows_beyond_the_theory_are_marked(page):
+    def told(route):
+        answer = route.fetch().json()
+        for i, flow in enumerate(answer["flows"]):
+            flow["validity"] = {"words": ["dense: beyond the theory"] if i == 2 else []}
+        route.fulfill(json=answer)
+
+    def drawn(route):
+        answer = route.fetch().json()
+        (branch,) = answer["branches"]
+        branch["validity"] = {"words": [["large slip"] if q < 1.0 else [] for q in branch["Q"]]}
+        route.fulfill(json=answer)
+
+    page.route("**/ask/flows?*", told)
+    page.route("**/ask/curve?*", drawn)
+    opened(page)
+    expect(page.locator("#flows .beyond")).to_have_text("dense: beyond the theory")
+    expect(page.locator("#profile-nu .beneath")).to_have_count(1)
+    expect(page.locator("#profile-nu .line")).to_have_count(3)
+    expect(page.locator("#curve .beneath")).to_have_count(1)
+    expect(page.locator("#beyond")).to_be_visible()
+
+
+def test_the_surface_temperature_is_called_what_it_is(page):
+    opened(page, "?against=T_surface")
+    expect(page.locator("#curve")).to_contain_text("Tsurface, far above")
+    expect(page.locator("#flows .numbers").nth(0)).to_contain_text("Tsurface 7.339")
+    page.locator("#surface").select_option("interface")
+    expect(page.locator("#curve")).to_contain_text("Tsurface, at the interface")
+
+
+def test_what_is_not_known_of_the_map_is_hatched(page):
+    def column(route):
+        place = place_of(route)
+        at = 0.05 + 0.65 * place
+        if 0.4 < place < 0.6:
+            route.fulfill(json={"error": "this column of the map is left out", "status": 422})
+            return
+        parts = {name: {"stops": [0.6 + 0.1 * place], "values": [1, 2]} for name in ("most", "families", "hot")}
+        route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
+
+    page.unroute("**/ask/map?*")
+    page.route("**/ask/map?*", column)
+    opened(page)
+    expect(page.locator("#map-key")).to_contain_text("hatched: not known")
+    expect(page.locator("#map path.unknown")).to_have_count(1)
+    left, right = page.evaluate(
+        "(({ x, width }) => [x, x + width])(document.querySelector('#map path.unknown').getBBox())"
+    )
+    box = page.locator("#map").bounding_box()
+    # From half-way before the first column that is not known to half-way behind the last.
+    assert 0.3 * box["width"] < left < right < 0.7 * box["width"]
+
+
+def test_regions_of_the_map_end_in_points_and_slanted_lines(page):
+    # A boundary that is steep: each column has it somewhere else, those beside it not at all.
+    def column(route):
+        place = place_of(route)
+        share = 0.5 + (place - 0.5) / 0.1
+        low, high = 0.5, 3**0.5 / 2
+        inside = 0.0 < share < 1.0
+        part = {
+            "stops": [low + share * (high - low)] if inside else [],
+            "values": [2, 1] if inside else [2 if share >= 1.0 else 1],
+        }
+        none = {"stops": [], "values": [0]}
+        parts = {"most": part, "families": part, "interior": none, "density": none, "hot": none}
+        at = 0.05 + 0.65 * place
+        route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
+
+    page.unroute("**/ask/map?*")
+    page.route("**/ask/map?*", column)
+    opened(page)
+    expect(page.locator("#map-key")).to_contain_text("At most this many flows")
+    expect(page.locator("#map-key")).not_to_contain_text("Drawing", timeout=20_000)
+    # Where a column of pixels crosses the boundary rises with its place, without steps.
+    heights = page.evaluate(
+        """() => {
+        const map = document.querySelector('#map'), box = map.getBoundingClientRect(), point = map.createSVGPoint();
+        const region = map.querySelectorAll('g > path[fill]')[1], tops = [];
+        for (let x = 0; x < box.width; x++) {
+            const inside = [];
+            for (let y = 0; y < box.height; y++) {
+                [point.x, point.y] = [x + 0.5, y + 0.5];
+                if (region.isPointInFill(point)) inside.push(y);
+            }
+            if (inside.length) tops.push(box.height - Math.min(...inside));
+        }
+        return tops;
+    }"""
+    )
+    steps = [after - before for before, after in pairwise(heights)]
+    assert min(steps) >= -1.0
+    # 360 pixels in all, over a tenth of the width.
+    assert max(steps) < 40.0, steps
 
 
 def test_a_chute_without_flows_says_why(page):
@@ -376,11 +578,20 @@ def test_contrast_of_text_and_colours(page, theme):
     assert set(used) <= set(known)
 
 
-def test_it_fits_a_phone(page):
-    page.set_viewport_size({"width": 390, "height": 800})
-    opened(page)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+@pytest.mark.parametrize("query", ["", "?si=1&surface=interface&against=T_surface&slope=0.31"])
+def test_it_fits_a_phone_and_a_desk(page, query):
+    for width in (1280, 701, 390):
+        page.set_viewport_size({"width": width, "height": 800})
+        opened(page, query)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(BEYOND_THE_WINDOW) == []
     assert page.locator("#controls").bounding_box()["width"] > 330
+
+
+BEYOND_THE_WINDOW = """() => [...document.querySelectorAll('section *, form *, header *')]
+    .filter((e) => e.checkVisibility() && !e.closest('svg, .skip'))
+    .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5)
+    .map((e) => e.outerHTML.slice(0, 80))"""
 
 
 def test_latency_from_slider_to_redraw(whole_page):

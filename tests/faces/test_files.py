@@ -2,7 +2,6 @@
 
 import csv
 import json
-from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -12,7 +11,7 @@ import pytest
 from chuteflow import Chute, Curve, FlowSet, InputError, Scales, curve, flows, load, save
 from chuteflow.faces.contract import curve_object, flow_set_object
 from chuteflow.faces.records import rows
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 SUFFIXES = [".nc", ".csv", ".json"]
@@ -92,6 +91,24 @@ def test_netcdf_says_what_it_holds(tmp_path):
         np.testing.assert_allclose(velocity[...][0], wanted, rtol=1e-10)
 
 
+def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
+    wanted = RESULTS["flows"]
+    save(wanted, tmp_path / "flows.nc")
+    with h5netcdf.File(tmp_path / "flows.nc") as file:
+        for name in VALIDITY:
+            assert file.variables[name][...].tolist() == [getattr(flow.validity, name) for flow in wanted]
+        bits = file.variables["validity"]
+        words = [*zip(bits.attrs["flag_meanings"].split(), bits.attrs["flag_masks"], strict=True)]
+        said = [[word for word, mask in words if value & mask] for value in bits[...]]
+        assert said == [["large_slip", "rarefied"], ["large_slip", "rarefied"], ["large_slip"]]
+    save(wanted, tmp_path / "flows.csv")
+    lines = [line for line in (tmp_path / "flows.csv").read_text().splitlines() if not line.startswith("#")]
+    for row in csv.DictReader(lines):
+        flow = wanted[int(row["flow"])]
+        assert (row["name"], row["validity"]) == (flow.name, flow.validity.summary)
+        assert float(row["knudsen_number"]) == flow.validity.knudsen_number
+
+
 def test_csv_reads_as_a_table(tmp_path):
     path = tmp_path / "curve.csv"
     save(RESULTS["curve"], path)
@@ -156,10 +173,10 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     save(RESULTS["flow"], path)
     before = path.read_bytes()
 
-    def full(self, *args, **kwargs):
+    def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr("os.fsync", full)
     with pytest.raises(InputError, match="No space left on device"):
         save(RESULTS["flows"], path)
     assert path.read_bytes() == before

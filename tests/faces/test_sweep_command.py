@@ -113,6 +113,8 @@ def test_points_that_failed_are_listed_by_status(tmp_path, capsys):
         (("--out", "none.zarr", "--status"), "there is no store none.zarr as yet"),
         (("--out", "study.toml"), "study.toml is no store of a study: take a path that does not exist yet"),
         (("--out", "s.zarr", "--workers", "0"), "--workers 0: must be 1 or more"),
+        (("--dry-run", "--workers", "0"), "--workers 0: must be 1 or more"),
+        (("--dry-run", "--workers", "2000"), "--workers 2000: must be 1024 or less"),
         (("--out", "s.zarr", "--workers", "2", "--cluster", "x"), "--workers 2 and --cluster x: give one of them"),
         (("--out", "s.zarr", "--chunks", "a"), "'a': write N, A:B or A:B:STEP, for example 0:100"),
         (("--out", "s.zarr", "--chunks", "7:"), "--chunks: the study has chunks 0 to 4, none of those asked for"),

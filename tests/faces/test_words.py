@@ -1,5 +1,7 @@
 """What is said of flows, chutes and curves, and how tables are set."""
 
+from itertools import pairwise
+
 import pytest
 
 from chuteflow import Chute, Scales, curve, flows
@@ -10,19 +12,53 @@ GRAINS = Scales(1e-3, 2500.0)
 CURVE = curve(PAPER, points=50)
 
 
-def test_three_flows_are_told_apart():
+def test_three_flows_have_names_of_their_own():
     found = flows(PAPER, Q=3.0)
-    assert [words.among(flow, found) for flow in found] == ["hot, dilute, deep", "in between", "cold, dense, shallow"]
+    names = ["hot, dilute, deep", "warm, moderately dense", "cold, dense, shallow"]
+    assert [words.among(flow, found) for flow in found] == names
+    assert [flow.name for flow in found] == names
+    (alone,) = flows(PAPER, Q=8.0)
+    assert words.among(alone, [alone]) == alone.name == "hot, dilute, deep"
 
 
-def test_flows_of_one_temperature_are_neither_hot_nor_cold():
-    found = flows(Chute(0.3, 0.9, 0.6, 0.8), T_surface=1.0)
-    assert [words.among(flow, found) for flow in found] == ["dilute, shallow", "dense, deep"]
+def test_a_flow_is_called_the_same_among_any_others():
+    # Of these two the second was called cold, dense and shallow, though it is hotter than the hot one above.
+    found = flows(Chute(0.36, 0.8, 0.8, 0.6), Q=60.0)
+    assert [flow.name for flow in found] == ["hot, dilute, deep"] * 2
+    assert [words.among(flow, found) for flow in found] == ["hot, dilute, deep (1 of 2)", "hot, dilute, deep (2 of 2)"]
+    assert words.among(found[1], found[1:]) == "hot, dilute, deep"
 
 
-def test_one_flow_is_compared_with_none():
-    found = flows(PAPER, Q=8.0)
-    assert [words.among(flow, found) for flow in found] == ["the only flow"]
+def test_names_of_the_flows_of_many_chutes_do_not_contradict_their_numbers():
+    chutes = [Chute(slope, 0.8, 0.8, 0.6) for slope in (0.25, 0.3, 0.33, 0.36)]
+    chutes += [Chute(0.4, 0.9, 0.6, 0.8), Chute(0.3, 0.8, 0.8, 0.6, surface="interface")]
+    met = [flow for one in chutes for branch in curve(one, points=25).branches for flow in branch.flows]
+    said = {word for flow in met for word in flow.name.split(", ")}
+    assert {"hot", "warm", "cold", "dilute", "moderately dense", "dense", "deep", "shallow"} == said
+    for order, name in (
+        (("cold", "warm", "hot"), "surface_temperature"),
+        (("dilute", "moderately dense", "dense"), "largest_volume_fraction"),
+        (("shallow", "deep"), "centre_of_mass"),
+    ):
+        groups = [[getattr(flow, name) for flow in met if word in flow.name.split(", ")] for word in order]
+        for lower, higher in pairwise(groups):
+            assert max(lower) < min(higher)
+
+
+def test_notes_explain_what_the_table_shows():
+    found = flows(PAPER, Q=3.0)
+    depth, *others = words.notes(found)
+    assert depth.startswith("depth: the height above which nu is below 1 % of nu_max")
+    assert [note.split(":")[0] for note in others] == ["large slip", "rarefied"]
+    (dense,) = flows(PAPER, T_surface=0.01)
+    assert [note.split(":")[0] for note in words.notes([dense])[1:]] == ["dense", "large slip"]
+
+
+def test_the_stretches_of_a_curve_have_their_validity():
+    said = list(words.validity(CURVE.branches[0].flows, PAPER, None))
+    assert said[0].startswith("from T_surface = 1e+05 to ")
+    assert said[0].endswith(": large slip, rarefied")
+    assert said[-1].endswith("to 0.001: packed: beyond the theory, large slip")
 
 
 def test_kinds_are_said_in_words():

@@ -6,6 +6,8 @@ from scipy.integrate import simpson
 from scipy.optimize import brentq
 
 from chuteflow import QUANTITIES, Chute, InputError, Scales, flows
+from chuteflow.steady.names import name_of
+from chuteflow.steady.validity import WORDS, Validity
 from chuteflow.theory.boundary import base_loss, kappa
 from chuteflow.theory.lun import DENSEST, LUN
 
@@ -208,3 +210,64 @@ def test_nothing_is_denser_than_the_densest_where_grains_are_packed_to_the_last(
     flow = flows(Chute(0.3, 1.0, 0.0, 0.5), Q=1e-6)[-1]
     assert flow.base_volume_fraction > 0.6199
     assert flow.base_volume_fraction <= flow.largest_volume_fraction
+
+
+# How far flows keep to the theory
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_validity_by_definition(case):
+    flow = flow_of(case)
+    top = min(flow.interface_height, 45.0 * flow.surface_temperature + 10.0)
+    p = flow.profile(np.linspace(0.0, top, 40001))
+    nu = p.volume_fraction
+    g0 = (1.0 - nu / DENSEST) ** (-2.5 * DENSEST)
+    mean = simpson(nu * nu * g0, x=p.height) / simpson(nu, x=p.height)
+    known = flow.validity
+    assert known.knudsen_number == pytest.approx(1.0 / (6.0 * np.sqrt(2.0) * mean) / flow.centre_of_mass, rel=1e-9)
+    assert known.slip_ratio == pytest.approx(p.velocity[0] / np.sqrt(p.granular_temperature[0]), rel=1e-10)
+    assert known.largest_volume_fraction == flow.largest_volume_fraction
+    assert known.packing == pytest.approx(nu.max() / DENSEST, rel=1e-7)
+    assert known.density_turns == np.count_nonzero(np.diff(np.sign(np.diff(nu))))
+
+
+def test_a_density_that_turns_often_is_told():
+    # Deep flows: the density rises and falls in layers.
+    found = flows(Chute(0.44588, 0.7122, 0.1765, 0.6753), M=22.0, surface_temperature=(3.02, 3.07))
+    assert len(found) >= 1
+    for flow in found:
+        nu = flow.profile(np.linspace(0.0, flow.depth, 20001)).volume_fraction
+        turns = np.count_nonzero(np.diff(np.sign(np.diff(nu))))
+        assert flow.validity.density_turns == turns > 2
+        assert "layered" in flow.validity.words
+
+
+@pytest.mark.parametrize(
+    ("nu_max", "packing", "slip", "knudsen", "turns", "words"),
+    [
+        (0.3, 0.48, 0.5, 0.01, 1, ()),
+        (0.49, 0.79, 1.0, 0.1, 1, ()),
+        (0.5, 0.81, 0.5, 0.01, 1, ("dense: beyond the theory",)),
+        (0.6, 0.97, 0.5, 0.01, 1, ("packed: beyond the theory",)),
+        (0.04, 0.06, 1.5, 0.5, 0, ("large slip", "rarefied")),
+        (0.3, 0.48, 0.5, 0.01, 2, ("layered",)),
+    ],
+)
+def test_words_of_validity(nu_max, packing, slip, knudsen, turns, words):
+    known = Validity(nu_max, packing, slip, knudsen, turns)
+    assert known.words == words
+    assert known.summary == (", ".join(words) or "within the theory")
+    assert set(words) <= set(WORDS)
+
+
+@pytest.mark.parametrize(
+    ("temperature", "nu_max", "h", "name"),
+    [
+        (7.3, 0.04, 8.8, "hot, dilute, deep"),
+        (5.0, 0.1, 5.0, "hot, moderately dense, deep"),
+        (4.9, 0.3, 4.9, "warm, dense"),
+        (0.9, 0.29, 1.9, "cold, moderately dense, shallow"),
+    ],
+)
+def test_names(temperature, nu_max, h, name):
+    assert name_of(temperature, nu_max, h) == name

@@ -15,7 +15,7 @@ from chuteflow.errors import InputError
 from chuteflow.sweeps import store as module
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.outcome import Status
-from chuteflow.sweeps.store import Marker, Store, StoreError
+from chuteflow.sweeps.store import DamageError, Marker, Store, StoreError
 from chuteflow.sweeps.study import from_dict
 from chuteflow.sweeps.work import work
 
@@ -174,3 +174,36 @@ def test_one_client_at_a_time_unless_each_has_its_own_chunks(fresh):
         pass
     with fresh.held(alone=False), fresh.held(alone=False):
         pass
+
+
+def test_a_long_list_is_kept_once_and_checked(tmp_path):
+    count = 300_000
+    rows = "".join(f"{0.2 + 0.2 * i / count!r},1.0,{'free' if i % 2 else 'interface'}\n" for i in range(count))
+    (tmp_path / "points.csv").write_text("slope,T_surface,surface\n" + rows)
+    given = {
+        "design": {"kind": "list", "file": "points.csv"},
+        "parameters": {"e": 0.8, "ew": 0.8, "roughness": 0.6},
+        "results": {"chunk": 6},
+    }
+    study = from_dict(given, tmp_path)
+    store = Store.made(tmp_path / "list.zarr", study)
+    own = store.path / ".chuteflow"
+    assert max((store.path / "zarr.json").stat().st_size, (own / "study.json").stat().st_size) < 100_000
+    assert Store.opened(store.path).study.digest == study.digest
+    work(str(store.path), 49_999)
+    with xarray.open_zarr(store.path) as data:
+        assert data["slope"][-6:].values.tolist() == [0.2 + 0.2 * i / count for i in range(count - 6, count)]
+        assert data["surface"][-2:].values.tolist() == [1, 0]
+    # Another list is another study, and a list that is damaged is noticed.
+    (tmp_path / "points.csv").write_text("slope,T_surface,surface\n" + rows.replace("0.25,", "0.26,", 1))
+    with pytest.raises(InputError, match=r"it differs in parameters\.slope\.sha256"):
+        Store.made(store.path, from_dict(given, tmp_path))
+    column = own / "columns" / "slope.npy"
+    content = bytearray(column.read_bytes())
+    content[1000] ^= 1
+    column.write_bytes(content)
+    module._study.cache_clear()
+    with pytest.raises(DamageError, match=r"the list of parameters\.slope is damaged"):
+        Store.opened(store.path)
+    assert Store.made(store.path, study).study.digest == study.digest
+    assert Store.opened(store.path).study.digest == study.digest

@@ -205,6 +205,8 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
         ("slope\n", "needs a line of names and at least one of numbers"),
         ("slope,e\n0.3\n", "line 2 of .* has 1 columns: the first has 2"),
         ("slope\nsteep\n", "points.csv, slope = 'steep': must be a number"),
+        ("slope,e,slope\n0.3,0.8,0.4\n", "points.csv has the column 'slope' more than once: keep one of them"),
+        ("slope\n" + "3" * 140000 + "\n", r"points.csv: field larger than field limit"),
         ("ew\n0.8\n", "parameters.ew is given in the study and in points.csv: give it once"),
     ],
 )
@@ -212,6 +214,14 @@ def test_lists_that_are_no_list_are_named(tmp_path, text, message):
     (tmp_path / "points.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         study("list", tmp_path, design={"file": "points.csv"})
+
+
+def test_files_may_begin_with_a_byte_order_mark(tmp_path):
+    (tmp_path / "points.csv").write_text("slope,T_surface\n0.3,1.5\n", encoding="utf-8-sig")
+    path = tmp_path / "study.toml"
+    text = '[design]\nkind = "list"\nfile = "points.csv"\n[parameters]\ne = 0.8\new = 0.8\nroughness = 0.6\n'
+    path.write_text(text, encoding="utf-8-sig")
+    assert column(read(path), "slope").tolist() == [0.3]
 
 
 def test_the_study_of_the_documents_is_a_study(tmp_path):

@@ -18,18 +18,21 @@ from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
 from chuteflow.analysis.tracing import Stretch, TracedFamily
 from chuteflow.analysis.turns import Dip, dips, turns
-from chuteflow.errors import InputError
+from chuteflow.checks import whole
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+from chuteflow.threads import on_one_thread
 
 #: Quantities whose folds are located.
 _FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def curve(
     chute: Chute,
     *,
@@ -53,9 +56,8 @@ def curve(
         SolveError: where a family could not be followed. Where flows of one could not be solved to the tolerance,
             its branch ends, and says why.
     """
-    if not 2 <= points <= 100_000:
-        raise InputError(f"points = {points}: must be from 2 to 100000")
-    checked_tolerance(tolerance)
+    points = whole("points", points, 2, 100_000)
+    tolerance = checked_tolerance(tolerance)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
     found = traced_families(problem, within)

@@ -17,12 +17,14 @@ from chuteflow.analysis.existence import reason_for_none
 from chuteflow.analysis.families import MOST_TRACED, Family, families
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.analysis.results import FlowSet, Searched
+from chuteflow.checks import number
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import flows_of
 from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+from chuteflow.threads import on_one_thread
 
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
@@ -38,6 +40,8 @@ _ASIDE = 1.2
 _QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def flows(
     chute: Chute,
     *,
@@ -68,7 +72,7 @@ def flows(
     """
     which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
-    checked_tolerance(tolerance)
+    tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
         # Well inside, so that a turn near the value is seen from both sides.
         within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
@@ -117,14 +121,8 @@ def _asked(given: dict[str, float | None]) -> tuple[int, float]:
         what = ", ".join(named) if named else "none"
         raise InputError(f"give exactly one of Q, M, h and T_surface: got {what}")
     ((name, raw),) = named.items()
-    try:
-        value = float(raw)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {raw!r}: must be a number") from None
     low, high = {"T_surface": WIDEST, "M": (1e-12, DEEPEST)}.get(name, (1e-12, 1e12))
-    if not low <= value <= high:
-        raise InputError(f"{name} = {value:g}: must be from {low:g} to {high:g}")
-    return _QUANTITIES[name], value
+    return _QUANTITIES[name], number(name, raw, low, high)
 
 
 @dataclass(frozen=True)

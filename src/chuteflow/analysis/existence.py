@@ -13,7 +13,6 @@ from chuteflow.analysis.ranges import Range
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.model import LOSS, WORK, Model
 from chuteflow.theory.hot import LAMBDA_C, dilute, hot_parameters
-from chuteflow.theory.laws import law
 
 _NAMES = ("Q", "h", "M", "T_surface")
 _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
@@ -45,7 +44,7 @@ def imbalance(model: Model) -> str:
                 "and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
-    limit = dilute(law(chute.closure), chute.restitution, chute.slope)
+    limit = dilute(model.law, chute.restitution, chute.slope)
     hot = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     if hot.delta > 0.0 and hot.F21 > 0.0 and hot.lambda_ > LAMBDA_C:
         return (

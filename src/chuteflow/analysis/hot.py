@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chuteflow import display
+from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.constitutive import Field
@@ -43,6 +45,13 @@ class HotModel:
     solution: HotSolution | None
     reason: str | None
     slope_bounds: SlopeBounds | None
+
+    def __repr__(self) -> str:
+        numbers = {"lambda": self.parameters.lambda_, "delta": self.parameters.delta}
+        if self.mass_holdup is None:
+            return display.line("HotModel", self.reason, **numbers)
+        density = "inverted" if self.inverted else "monotonic"
+        return display.line("HotModel", f"{self.interior}, density {density}", **numbers, M=self.mass_holdup)
 
     @property
     def exists(self) -> bool:
@@ -191,11 +200,12 @@ def shoot(lambda_: float, mu: float = 0.0, s: ArrayLike | None = None, tolerance
         InputError: for a lambda without hot flow, or ``s`` or ``tolerance`` out of range.
         SolveError: where the base is not reached, for lambda near 3.
     """
-    if not (math.isfinite(lambda_) and lambda_ < LAMBDA_C and lambda_ != 0.0):
+    lambda_, mu, tolerance = number("lambda", lambda_), number("mu", mu), number("tolerance", tolerance)
+    if not (lambda_ < LAMBDA_C and lambda_ != 0.0):
         raise InputError(f"lambda = {lambda_}: hot flows have a lambda below 3, other than 0")
     if not 1e-13 <= tolerance <= 1e-3:
         raise InputError(f"tolerance = {tolerance}: must be from 1e-13 to 1e-3")
-    s = np.linspace(0.005, 1.0, 200) if s is None else np.asarray(s, dtype=float)
+    s = np.linspace(0.005, 1.0, 200) if s is None else real_array("s", s)
     if not (s.size and s.min() > 0.0 and s.max() <= 1.0):
         raise InputError("s must be above 0 and at most 1")
     fine = _Trajectory.to_base(lambda_, _START, tolerance)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chuteflow.checks import number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M, LOG_T
@@ -41,7 +42,8 @@ class Range:
         Raises:
             InputError: if it is empty or beyond what can be searched.
         """
-        low, high = surface_temperature
+        low, high = pair("surface_temperature", surface_temperature)
+        largest_holdup = number("largest_holdup", largest_holdup)
         if not WIDEST[0] <= low < high <= WIDEST[1]:
             raise InputError(
                 f"surface temperatures from {low:g} to {high:g}: must rise, within {WIDEST[0]:g} to {WIDEST[1]:g}"

@@ -9,14 +9,16 @@ from typing import overload
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, PLACE
 
 
 @dataclass(frozen=True)
 class Searched:
-    """The range in which nothing was missed: surface temperatures (low, high) and largest hold-up."""
+    """The range searched: surface temperatures (low, high) and largest hold-up."""
 
     surface_temperature: tuple[float, float]
     largest_holdup: float
@@ -24,7 +26,7 @@ class Searched:
 
 @dataclass(frozen=True, eq=False)
 class FlowSet(Sequence[Flow]):
-    """Every flow that was asked for, from hot to cold (by surface temperature, then by hold-up).
+    """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
     ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where a branch
@@ -37,6 +39,22 @@ class FlowSet(Sequence[Flow]):
     tolerance: float
     reason: str | None
     incomplete: str | None = None
+
+    def __repr__(self) -> str:
+        warmth = display.listed([flow.surface_temperature for flow in self.flows])
+        found = f"T_surface = {warmth}" if self.flows else self.reason
+        return display.line("FlowSet", display.counted(len(self), "flow"), found)
+
+    def _repr_html_(self) -> str:
+        header = ["", "name", *(NUMBERS[name].symbol for name in PLACE), "density", "interior", "validity", "error"]
+        rows = [
+            [
+                *(str(i), flow.name, *_place(flow), flow.density, flow.interior),
+                *(flow.validity.summary, f"{flow.error:.0e}"),
+            ]
+            for i, flow in enumerate(self, 1)
+        ]
+        return display.html_table(f"{display.counted(len(self), 'flow')} on {self.chute}", header, rows, self.reason)
 
     def __len__(self) -> int:
         return len(self.flows)
@@ -60,6 +78,10 @@ class SpecialPoint:
     flow: Flow
     position: int
 
+    def __repr__(self) -> str:
+        numbers = {NUMBERS[name].symbol: getattr(self.flow, name) for name in PLACE}
+        return display.line("SpecialPoint", self.kind, **numbers)
+
 
 #: Kinds of special points, and what they are.
 KINDS = {
@@ -79,6 +101,14 @@ class Branch:
     flows: tuple[Flow, ...]
     special: tuple[SpecialPoint, ...]
     ends: tuple[str, str]
+
+    def __repr__(self) -> str:
+        found = display.counted(len(self.special), "special point")
+        reach = (display.span("Q", self.mass_flux), display.span("T_surface", self.surface_temperature))
+        return display.line("Branch", f"{display.counted(len(self.flows), 'flow')}, {found}", *reach)
+
+    def _repr_html_(self) -> str:
+        return display.html_table(repr(self)[1:-1], ["", *(NUMBERS[name].symbol for name in PLACE)], _stations(self))
 
     @cached_property
     def mass_flux(self) -> Array:
@@ -110,3 +140,29 @@ class Curve:
     searched: Searched
     tolerance: float
     reason: str | None
+
+    def __repr__(self) -> str:
+        families = display.counted(len(self.branches), "family", "families")
+        total = display.counted(sum(len(branch.flows) for branch in self.branches), "flow")
+        reach = [
+            display.span(NUMBERS[name].symbol, np.concatenate([getattr(branch, name) for branch in self.branches]))
+            for name in ("mass_flux", "surface_temperature")
+            if self.branches
+        ]
+        return display.line("Curve", f"{families}, {total}", *reach, self.reason)
+
+    def _repr_html_(self) -> str:
+        header = ["family", "", *(NUMBERS[name].symbol for name in PLACE)]
+        rows = [[str(i), *row] for i, branch in enumerate(self.branches, 1) for row in _stations(branch)]
+        families = display.counted(len(self.branches), "family", "families")
+        return display.html_table(f"{families} of flows on {self.chute}", header, rows, self.reason)
+
+
+def _place(flow: Flow) -> list[str]:
+    return [display.number(getattr(flow, name)) for name in PLACE]
+
+
+def _stations(branch: Branch) -> list[list[str]]:
+    """Where a branch begins and ends, and its special points, as rows of cells."""
+    between = [[point.kind, *_place(point.flow)] for point in branch.special]
+    return [["begins", *_place(branch.flows[0])], *between, ["ends", *_place(branch.flows[-1])]]

@@ -34,6 +34,7 @@ _LONG = 45
 _LIMIT = style.Stroke(style.GREY, style.DOTTED)
 
 
+@style.own_settings()
 def plot_boundaries(found: BoundarySet, quantity: str = "mass_flux") -> Figure:
     """The ``quantity``, a number of the registry, of the flows on every boundary against the second parameter.
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
+from io import BytesIO
+from typing import Any, BinaryIO
 
 from chuteflow import __version__
 from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning
 from chuteflow.faces import contract
 from chuteflow.faces.contract import PLACE, SHORT, finite
 from chuteflow.faces.references import PAPER, numbers_are
-from chuteflow.faces.writing import require_writable, written_beside
+from chuteflow.faces.writing import as_text, require_writable, write_whole
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
@@ -49,8 +49,9 @@ def save(found: BoundarySet, path: str | os.PathLike[str]) -> None:
     """
     write = {".json": _write_json, ".csv": _write_csv, ".nc": _write_netcdf}
     suffix = require_writable(path, tuple(write))
-    with written_beside(path) as partial:
-        write[suffix](found, partial)
+    stream = BytesIO()
+    write[suffix](found, stream)
+    write_whole(path, stream.getvalue())
 
 
 def _boundary(boundary: Boundary, second: str) -> dict[str, Any]:
@@ -71,8 +72,8 @@ def _boundary(boundary: Boundary, second: str) -> dict[str, Any]:
     }
 
 
-def _write_json(found: BoundarySet, path: Path) -> None:
-    path.write_text(contract.text(boundaries_object(found)) + "\n", encoding="utf-8")
+def _write_json(found: BoundarySet, stream: BinaryIO) -> None:
+    stream.write(contract.text(boundaries_object(found)).encode() + b"\n")
 
 
 def _rows(found: BoundarySet) -> Iterator[tuple[int, str, Flow, float]]:
@@ -110,9 +111,9 @@ def _about(found: BoundarySet) -> dict[str, str]:
     }
 
 
-def _write_csv(found: BoundarySet, path: Path) -> None:
+def _write_csv(found: BoundarySet, stream: BinaryIO) -> None:
     columns = _columns(found)
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with as_text(stream) as file:
         file.writelines(f"# {name}: {text}\n" for name, text in _about(found).items())
         file.write("# error: estimated relative error of Q, h, M and the second parameter, the largest\n")
         table = csv.writer(file, lineterminator="\n")
@@ -120,7 +121,7 @@ def _write_csv(found: BoundarySet, path: Path) -> None:
         table.writerows(zip(*columns.values(), strict=True))
 
 
-def _write_netcdf(found: BoundarySet, path: Path) -> None:
+def _write_netcdf(found: BoundarySet, stream: BinaryIO) -> None:
     import h5netcdf
     import numpy as np
 
@@ -146,7 +147,7 @@ def _write_netcdf(found: BoundarySet, path: Path) -> None:
             {"long_name": "estimated relative error of Q, h, M and the second parameter, the largest", "units": "1"},
         ),
     }
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(stream, "w") as file:
         file.dimensions = {"point": len(columns["error"])}
         file.attrs.update({"Conventions": "CF-1.11", **_about(found)})
         for name, (values, attributes) in described.items():

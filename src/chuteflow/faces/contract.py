@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NoReturn
 
 from chuteflow.analysis.counting import Count, flux_counts
 from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched
+from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
 PARAMETERS = {
@@ -27,8 +28,6 @@ PARAMETERS = {
 }
 #: The same the other way round.
 SHORT = {long: short for short, long in PARAMETERS.items()}
-#: The numbers that place a flow on a curve.
-PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 
 
 def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str, Any]:
@@ -69,14 +68,23 @@ def chute_object(chute: Chute) -> dict[str, float | str]:
     return {short: getattr(chute, name) for short, name in PARAMETERS.items()}
 
 
-def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, float | str | None]:
+def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
     """One flow: every number of the registry by its symbol, and its kinds."""
     return {
         **_numbers(flow, NUMBERS, scales),
+        "name": flow.name,
         "interior": flow.interior,
         "density": flow.density,
         "error": finite(flow.error),
+        "validity": validity_object(flow),
     }
+
+
+def validity_object(flow: Flow) -> dict[str, Any]:
+    """How far a flow keeps to the theory: numbers without scales, and the words where a limit is passed."""
+    known = flow.validity
+    numbers = {name: finite(getattr(known, name)) for name in VALIDITY}
+    return {"nu_max": finite(known.largest_volume_fraction), **numbers, "words": list(known.words)}
 
 
 def factor(name: str, chute: Chute, scales: Scales | None) -> float:
@@ -98,6 +106,30 @@ def text(obj: Any) -> str:
     return json.dumps(obj, allow_nan=False)
 
 
+def parsed(text: str | bytes) -> Any:
+    """The value of a JSON text, in UTF-8 with or without a byte-order mark.
+
+    Raises:
+        ValueError: for what is no JSON, a number that is not finite, or a name that an object has twice.
+        RecursionError: for too many brackets in one another.
+    """
+    if isinstance(text, bytes):
+        text = text.decode("utf-8-sig")
+    return json.loads(text, object_pairs_hook=_without_doubles, parse_constant=_not_finite)
+
+
+def _without_doubles(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise InputError(f"{next(name for name in names if names.count(name) > 1)[:40]!r} is in it twice")
+    return found
+
+
+def _not_finite(word: str) -> NoReturn:
+    raise InputError(f"{word} is in it: numbers must be finite")
+
+
 def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[str, float | str | None]:
     return {NUMBERS[name].symbol: finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in names}
 
@@ -108,7 +140,10 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
         for name in PLACE
     }
     special = [{"kind": point.kind, **_numbers(point.flow, PLACE, scales)} for point in branch.special]
-    return {**arrays, "special": special, "ends": list(branch.ends)}
+    known = [flow.validity for flow in branch.flows]
+    validity: dict[str, Any] = {name: [finite(getattr(one, name)) for one in known] for name in VALIDITY}
+    validity["words"] = [list(one.words) for one in known]
+    return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
 
 
 def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:

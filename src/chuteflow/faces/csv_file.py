@@ -7,34 +7,37 @@ places. The comments above the table are for people; those below it hold the unk
 from __future__ import annotations
 
 import csv
-import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 from chuteflow import __version__
 from chuteflow.analysis.results import Curve
+from chuteflow.checks import shown
 from chuteflow.errors import InputError
-from chuteflow.faces import records
+from chuteflow.faces import contract, records
 from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
+from chuteflow.faces.writing import as_text
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, Scales
+from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, VALIDITY, Scales
+from chuteflow.steady.validity import WORDS
 
 _HEAD, _ROW = "# restore: ", "# unknowns: "
-_KINDS = ("interior", "density", "error")
+_KINDS = ("interior", "density", "error", *VALIDITY, "validity", "name")
 
 
-def write(result: Result, path: Path, scales: Scales | None) -> None:
-    """Write ``result`` to ``path``."""
+def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
+    """Write ``result`` to ``stream``."""
     found = records.rows(result)
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with as_text(stream) as file:
         file.writelines(f"# {line}\n" for line in _comments(result, scales))
         _write_table(file, result, found, scales)
-        file.write(_HEAD + json.dumps(records.head(result) | {"rows": len(found)}, allow_nan=False) + "\n")
+        file.write(_HEAD + contract.text(records.head(result, found) | {"rows": len(found)}) + "\n")
         for row in found:
-            file.write(_ROW + json.dumps(records.unknowns(row), allow_nan=False) + "\n")
+            file.write(_ROW + contract.text(records.unknowns(row)) + "\n")
 
 
 def read(path: Path) -> Result:
@@ -44,18 +47,44 @@ def read(path: Path) -> Result:
         InputError: for a later or unknown format, or a file that is cut short.
         ValueError, KeyError, TypeError: for a file that is not of this format.
     """
-    with path.open(encoding="utf-8") as file:
-        lines = [line for line in file if line.startswith("#")]
-    heads = [line.removeprefix(_HEAD) for line in lines if line.startswith(_HEAD)]
-    if len(heads) != 1:
+    lines = lines_of(path)
+    require_columns(lines)
+    head = kept_in(lines, _HEAD)
+    rows = [contract.parsed(line.removeprefix(_ROW)) for line in lines if line.startswith(_ROW)]
+    count = head.pop("rows")
+    if len(rows) != count:
+        raise InputError(f"it is cut short, or has lines twice: {len(rows)} of {shown(count)} flows are in it")
+    return records.restored(head, rows)
+
+
+def lines_of(path: Path) -> list[str]:
+    """The lines of a text in UTF-8, with or without a byte-order mark."""
+    with path.open(encoding="utf-8-sig") as file:
+        return list(file)
+
+
+def kept_in(lines: Sequence[str], start: str) -> Any:
+    """The JSON value in the one line that begins with ``start``.
+
+    Raises:
+        InputError: where there is none, or several.
+    """
+    found = [line.removeprefix(start) for line in lines if line.startswith(start)]
+    if len(found) != 1:
         raise InputError("it is cut short, or was not written by chuteflow")
-    head = json.loads(heads[0])
-    records.require_format(head)
-    chute = records.chute_from(head["chute"])
-    kept = [json.loads(line.removeprefix(_ROW)) for line in lines if line.startswith(_ROW)]
-    if len(kept) != head["rows"]:
-        raise InputError(f"it is cut short: {len(kept)} of {head['rows']} flows are in it")
-    return records.rebuilt(head, [records.row_from(chute, row) for row in kept])
+    return contract.parsed(found[0])
+
+
+def require_columns(lines: Sequence[str]) -> None:
+    """Check that the table between the comments names no column twice.
+
+    Raises:
+        InputError: naming the column.
+    """
+    names = next((line for line in lines if not line.startswith("#")), "").rstrip("\n").split(",")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise InputError(f"it has the column {name[:40]!r} {times} times")
 
 
 def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
@@ -76,6 +105,9 @@ def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
         unit = "" if scales is None else f" [{quantity.unit}]"
         yield f"{name}: {quantity.symbol}{unit}, {quantity.description}, {quantity.equation}"
     yield "error: estimated relative error of mass_flux, centre_of_mass and mass_holdup, the largest"
+    for name, quantity in VALIDITY.items():
+        yield f"{name}: {quantity.description}"
+    yield "validity: " + "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items())
 
 
 def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Scales | None) -> None:
@@ -96,4 +128,6 @@ def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Sca
 def _numbers(flow: Flow, scales: Scales | None) -> list[Any]:
     """The numbers and kinds of a flow; what is not finite is an empty cell."""
     numbers = [finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in NUMBERS]
-    return [*numbers, flow.interior, flow.density, finite(flow.error)]
+    known = flow.validity
+    limits = [finite(getattr(known, name)) for name in VALIDITY]
+    return [*numbers, flow.interior, flow.density, finite(flow.error), *limits, known.summary, flow.name]

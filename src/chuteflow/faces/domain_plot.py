@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from chuteflow.analysis.domains import Boundary, Domain
 from chuteflow.faces.plots import PARAMETERS
 from chuteflow.paper import style
+from chuteflow.steady.quantities import NUMBERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_TEMPERATURE = NUMBERS["surface_temperature"].latex
 #: Fills for 0, 1, 2, ... flows that share one flux; the last stands for more too.
 _COUNTS = ("#ffffff", "#e3eef8", "#bcd7ee", "#86b5dc", "#5590c4", "#2f6ba5")
 #: Fills for monotonic densities alone, inverted ones alone, and both, by the sum of their bits.
@@ -57,6 +59,7 @@ _RASTER = 160
 _LINE = 1.1
 
 
+@style.own_settings()
 def plot_domain(found: Domain) -> Figure:
     """Two panels: how many flows share one flux, with the bounds of hot flows and hidden families hatched; and the
     kinds of density and interior, with the bounds of flows at the temperatures asked for."""
@@ -87,7 +90,7 @@ def _others(found: Domain) -> str:
     ]
     surface = {"free": "free surface", "interface": "interface"}[plane.chute.surface]
     low, high = found.searched.surface_temperature
-    searched = rf"$T_s$ from {low:g} to {high:g}, $M$ to {found.searched.largest_holdup:g}"
+    searched = rf"${_TEMPERATURE}$ from {low:g} to {high:g}, $M$ to {found.searched.largest_holdup:g}"
     return f"{', '.join([*said, surface])}, closure {plane.chute.closure}; {searched}"
 
 
@@ -182,6 +185,6 @@ def _key(found: Domain) -> Iterator[Any]:
         if kind in kinds:
             yield Line2D([], [], label=words, **stroke.line(_LINE))
     for temperature, stroke in zip(found.plane.temperatures, _strokes(found), strict=True):
-        yield Line2D([], [], label=rf"first or last flow at $T_s = {temperature:g}$", **stroke.line(_LINE))
+        yield Line2D([], [], label=rf"first or last flow at ${_TEMPERATURE} = {temperature:g}$", **stroke.line(_LINE))
     if found.hidden.any():
         yield Patch(facecolor="none", edgecolor=style.BLACK, hatch="/////", linewidth=0.0, label="hidden families")

@@ -6,11 +6,11 @@ A file keeps the columns from which a map is read, so that it loads back to the 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -18,12 +18,27 @@ from chuteflow import __version__
 from chuteflow.analysis.domains import KINDS_OF_BOUNDARIES, Axis, Boundary, Domain, Plane
 from chuteflow.analysis.domains.columns import Column, Part
 from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
+from chuteflow.analysis.domains.maps import COARSEST, FINEST, LARGEST_SIZE
+from chuteflow.analysis.domains.plane import CODES, HOT_CODES
 from chuteflow.analysis.ranges import Range
+from chuteflow.checks import checked_size, number, whole
 from chuteflow.errors import InputError
 from chuteflow.faces import contract
 from chuteflow.faces.contract import SHORT
-from chuteflow.faces.records import chute_from, require_format
+from chuteflow.faces.csv_file import kept_in, lines_of, require_columns
+from chuteflow.faces.records import (
+    CHECKSUM,
+    LAW,
+    checksum,
+    chute_from,
+    fingerprint_of,
+    numbers,
+    require_checksum,
+    require_format,
+    require_law,
+)
 from chuteflow.faces.references import PAPER, numbers_are
+from chuteflow.faces.writing import as_text
 
 TITLE = "domains of existence of steady, fully developed flows of grains down a chute"
 KIND, FORMAT = "domain", 1
@@ -117,10 +132,11 @@ def _boundary(one: Boundary) -> dict[str, Any]:
 def _kept(found: Domain) -> dict[str, Any]:
     plane = found.plane
     within = plane.within
-    return {
+    kept = {
         "format": FORMAT,
         "kind": KIND,
         "chute": contract.chute_object(plane.chute),
+        LAW: fingerprint_of(plane.chute),
         "axes": [[axis.name, axis.low, axis.high] for axis in (plane.x, plane.y)],
         "size": [len(found.x), len(found.y)],
         "temperatures": list(plane.temperatures),
@@ -129,6 +145,7 @@ def _kept(found: Domain) -> dict[str, Any]:
         "columns": _columns_kept(found.columns),
         "hot_columns": _columns_kept(found.hot_columns),
     }
+    return kept | {CHECKSUM: checksum(kept)}
 
 
 def _columns_kept(columns: Sequence[Column]) -> list[Any]:
@@ -142,34 +159,60 @@ def _restored(kept: Mapping[str, Any]) -> Domain:
         InputError: for a later format, or for what is no map.
     """
     require_format(kept)
-    chute = chute_from(dict(kept["chute"]))
-    x, y = (Axis(str(name), float(low), float(high)) for name, low, high in kept["axes"])
-    (low, high), deepest = kept["searched"]
-    within = Range.checked((float(low), float(high)), float(deepest), chute.surface)
-    plane = Plane(x, y, chute, tuple(map(float, kept["temperatures"])), within)
-    size = tuple(int(count) for count in kept["size"])
-    return Domain.on_cells(
+    chute = chute_from(kept["chute"])
+    require_law(chute, kept)
+    x, y = (Axis(str(name), low, high) for name, low, high in kept["axes"])
+    surface_temperature, deepest = kept["searched"]
+    within = Range.checked(surface_temperature, deepest, chute.surface)
+    temperatures = numbers("temperatures", kept["temperatures"])
+    plane = Plane(x, y, chute, tuple(temperatures.tolist()), within)
+    found = Domain.on_cells(
         plane,
-        (size[0], size[1]),
-        float(kept["tolerance"]),
-        _columns_from(kept["columns"]),
-        _columns_from(kept["hot_columns"]),
+        checked_size(kept["size"], 1, LARGEST_SIZE),
+        number("tolerance", kept["tolerance"], FINEST, COARSEST),
+        _columns_from(kept["columns"], len(CODES) + len(temperatures)),
+        _columns_from(kept["hot_columns"], len(HOT_CODES)),
     )
+    require_checksum(kept)
+    return found
 
 
-def _columns_from(kept: Sequence[Any]) -> tuple[Column, ...]:
-    return tuple(
-        Column(float(place), tuple(Part(tuple(map(float, stops)), tuple(map(int, values))) for stops, values in parts))
-        for place, parts in kept
+def _columns_from(kept: Sequence[Any], count: int) -> tuple[Column, ...]:
+    """Columns of ``count`` parts each.
+
+    Raises:
+        InputError: for places or stops that are no shares of an axis, or do not rise.
+    """
+    places = _shares_from([place for place, _ in kept])
+    columns = tuple(
+        Column(place, tuple(_part_from(*part) for part in parts))
+        for place, (_, parts) in zip(places, kept, strict=True)
     )
+    if any(len(one.parts) != count for one in columns):
+        raise InputError(f"a column must have {count} numbers")
+    return columns
+
+
+def _part_from(stops: Any, values: Any) -> Part:
+    part = Part(_shares_from(stops), tuple(whole("a class", value, -1, 10**6) for value in values))
+    if len(part.values) != len(part.stops) + 1:
+        raise InputError("a column must have one class more than stops")
+    return part
+
+
+def _shares_from(kept: Any) -> tuple[float, ...]:
+    found = tuple(number("a share of an axis", share, 0.0, 1.0) for share in kept)
+    if any(one >= two for one, two in pairwise(found)):
+        raise InputError("shares of an axis must rise")
+    return found
 
 
 # Files
 
 
-def write(found: Domain, path: Path) -> None:
-    """Write a map to ``path``, .nc, .csv or .json."""
-    {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}[path.suffix.lower()](found, path)
+def write(found: Domain, stream: BinaryIO, suffix: str) -> None:
+    """Write a map to ``stream`` in the format of ``suffix``: .nc, .csv or .json."""
+    {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}[suffix](found, stream)
 
 
 def read(path: Path) -> Domain | None:
@@ -183,17 +226,17 @@ def read(path: Path) -> Domain | None:
     return None if kept is None else _restored(kept)
 
 
-def _write_json(found: Domain, path: Path) -> None:
+def _write_json(found: Domain, stream: BinaryIO) -> None:
     whole = domain_object(found, found.most.size) | {"source": f"chuteflow {__version__}", "restore": _kept(found)}
-    path.write_text(contract.text(whole) + "\n", encoding="utf-8")
+    stream.write(contract.text(whole).encode() + b"\n")
 
 
 def _kept_in_json(path: Path) -> Any:
-    kept = json.loads(path.read_text(encoding="utf-8"))["restore"]
+    kept = contract.parsed(path.read_bytes())["restore"]
     return kept if kept["kind"] == KIND else None
 
 
-def _write_csv(found: Domain, path: Path) -> None:
+def _write_csv(found: Domain, stream: BinaryIO) -> None:
     """One row for each cell, row by row from the lowest y, between comment lines."""
     plane = found.plane
     layers = {name: getattr(found, name).astype(int).ravel() for name in CLASSES}
@@ -202,13 +245,13 @@ def _write_csv(found: Domain, path: Path) -> None:
         for temperature, layer in zip(plane.temperatures, found.exists_at, strict=True)
     }
     y, x = np.meshgrid(found.y, found.x, indexing="ij")
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with as_text(stream) as file:
         file.writelines(f"# {line}\n" for line in _comments(found))
         table = csv.writer(file, lineterminator="\n")
         table.writerow([plane.x.name, plane.y.name, *layers])
         columns = [x.ravel().tolist(), y.ravel().tolist(), *(layer.tolist() for layer in layers.values())]
         table.writerows(zip(*columns, strict=True))
-        file.write(_RESTORE + json.dumps(_kept(found), allow_nan=False) + "\n")
+        file.write(_RESTORE + contract.text(_kept(found)) + "\n")
 
 
 def _comments(found: Domain) -> Iterator[str]:
@@ -230,23 +273,21 @@ def _comments(found: Domain) -> Iterator[str]:
 
 
 def _kept_in_csv(path: Path) -> Any:
-    with path.open(encoding="utf-8") as file:
-        if TITLE not in next(file, ""):
-            return None
-        heads = [line.removeprefix(_RESTORE) for line in file if line.startswith(_RESTORE)]
-    if len(heads) != 1:
-        raise InputError("it is cut short, or was not written by chuteflow")
-    return json.loads(heads[0])
+    lines = lines_of(path)
+    if not lines or TITLE not in lines[0]:
+        return None
+    require_columns(lines)
+    return kept_in(lines, _RESTORE)
 
 
-def _write_netcdf(found: Domain, path: Path) -> None:
+def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
     import h5netcdf
 
     plane = found.plane
     x, y = plane.x.name, plane.y.name
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     fixed = {name: value for name, value in plane.chute.as_dict().items() if name not in (x, y)}
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(stream, "w") as file:
         layers = {"temperature": len(plane.temperatures)} if plane.temperatures else {}
         file.dimensions = {**layers, y: len(found.y), x: len(found.x)}
         file.attrs.update(
@@ -274,7 +315,7 @@ def _write_netcdf(found: Domain, path: Path) -> None:
             attributes = {"long_name": "a flow at the surface temperature", **_two("no_flow", "flow")}
             _put(file, "exists_at", ("temperature", y, x), found.exists_at.astype("i1"), attributes)
         _write_boundaries(file.create_group("boundaries"), found)
-        kept = np.frombuffer(json.dumps(_kept(found), allow_nan=False).encode(), dtype="u1")
+        kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
         group = file.create_group("restore")
         group.attrs["long_name"] = "columns, from which chuteflow restores the map to the last bit"
         group.attrs["kind"] = KIND
@@ -322,10 +363,9 @@ def _put(group: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray,
 
 
 def _kept_in_netcdf(path: Path) -> Any:
-    import h5netcdf
+    from chuteflow.faces.netcdf_file import restored_group
 
-    with h5netcdf.File(path, "r") as file:
-        group = file.groups["restore"]
+    with restored_group(path) as group:
         if group.attrs.get("kind") != KIND:
             return None
-        return json.loads(bytes(group.variables["columns"][...]))
+        return contract.parsed(bytes(group["columns"][...]))

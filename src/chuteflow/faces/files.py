@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chuteflow.errors import InputError
 from chuteflow.faces.records import KIND_OF, Result
-from chuteflow.faces.writing import require_suffix, require_writable, written_beside
+from chuteflow.faces.writing import require_suffix, require_writable, write_whole
 from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
     from chuteflow.analysis.domains import Domain
 
-#: The module of each format, imported when it is needed; each has write(result, path, scales) and read(path).
+#: The module of each format, imported when it is needed; each has write(result, stream, scales) and read(path).
 FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
 #: What reading a damaged file may raise.
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)
@@ -39,8 +40,9 @@ def save(result: Result | Domain, path: str | os.PathLike[str], *, scales: Scale
     if type(result) not in KIND_OF:
         raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows, a curve or a domain")
     writer = import_module(f"chuteflow.faces.{FORMATS[require_writable(path, tuple(FORMATS))]}")
-    with written_beside(path) as partial:
-        writer.write(result, partial, scales)
+    stream = BytesIO()
+    writer.write(result, stream, scales)
+    write_whole(path, stream.getvalue())
 
 
 def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | None) -> None:
@@ -48,9 +50,10 @@ def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | N
 
     if scales is not None:
         raise InputError("a domain has no units: save it without scales")
-    require_writable(path, tuple(FORMATS))
-    with written_beside(path) as partial:
-        domain_records.write(found, partial)
+    suffix = require_writable(path, tuple(FORMATS))
+    stream = BytesIO()
+    domain_records.write(found, stream, suffix)
+    write_whole(path, stream.getvalue())
 
 
 def load(path: str | os.PathLike[str]) -> Result | Domain:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chuteflow.faces.plots import parameters
 from chuteflow.paper import style
+from chuteflow.steady.quantities import NUMBERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,10 +19,15 @@ if TYPE_CHECKING:
 
 #: Shades of growth on either side of zero, and the largest decay that is told from the rest, over the largest growth.
 _SHADES, _DEEPEST = 8, 2.0
+#: First digits of round numbers, the roundest first; others are for axes with fewer ticks than these.
+_DIGITS, _ROUNDEST, _FEW = (1, 2, 5, 3, 7, 4, 6, 8, 9), (1, 2, 5), 3
+#: Smallest distance of ticks, as a share of the axis.
+_APART = 0.08
 _MAP_OF_COLOURS = "RdBu_r"
 _NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
 
 
+@style.own_settings()
 def plot_wave_map(found: WaveMap) -> Figure:
     """Growth over wavenumbers along and across the slope."""
     figure, (ax,) = style.panels(1, width=5.2, height=4.2)
@@ -42,24 +49,25 @@ def plot_wave_map(found: WaveMap) -> Figure:
     return figure
 
 
+@style.own_settings()
 def plot_family_map(found: FamilyMap) -> Figure:
     """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
     warmth = np.array([flow.surface_temperature for flow in found.flows])
     place = np.linspace(0.0, 1.0, len(warmth))
     _shaded(figure, left, found.depth_wavenumber, place, found.growth)
-    left.set_xscale("log")
-    ticks = np.linspace(0, len(warmth) - 1, 6).round().astype(int)
-    left.set_yticks(place[ticks], [f"{warmth[i]:.3g}" for i in ticks])
+    style.logarithmic(left, "x")
+    ticks = _round_places(place, warmth)
+    left.set_yticks([*ticks], [*ticks.values()])
     left.set_ylim(0.0, 1.0)
     for i, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True)):
         left.plot(*curve.z.T, **_NEUTRAL.line(1.6))
         flux = [flow.mass_flux for flow in flows]
         right.plot(flux, curve.z[:, 0], label=f"neutral curve {i + 1}", **style.stroke(i).line())
-    style.name_axes(left, "$k h$", r"$T_\infty$ along the family")
+    style.name_axes(left, "$k h$", f"${NUMBERS['surface_temperature'].latex}$ along the family")
     style.name_axes(right, style.label("mass_flux"), "$k h$")
     style.spread_scale(right, "x", [[flow.mass_flux for flow in flows] for flows in found.neutral_flows])
-    right.set_yscale("log")
+    style.logarithmic(right, "y")
     if found.neutral:
         style.legend(right)
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
@@ -67,6 +75,27 @@ def plot_family_map(found: FamilyMap) -> Figure:
     )
     style.caption(figure, f"{parameters(found.flows[0].chute)}; {waves}; bold: neutral")
     return figure
+
+
+def _round_places(place: Any, warmth: Any) -> dict[float, str]:
+    """Places along the family at which its surface temperature is a round number, and these numbers.
+
+    Powers of ten come before others, which stand where there is room, the last ones only while there are few.
+    """
+    found: dict[float, str] = {}
+    decades = range(math.floor(math.log10(warmth.min())), math.ceil(math.log10(warmth.max())) + 1)
+    for digit in _DIGITS:
+        if digit not in _ROUNDEST and len(found) >= _FEW:
+            break
+        for power in decades:
+            value = digit * 10.0**power
+            above = np.log(warmth / value)
+            for i in np.flatnonzero((above[:-1] < 0.0) != (above[1:] < 0.0)):
+                share = above[i] / (above[i] - above[i + 1])
+                at = float(place[i] + share * (place[i + 1] - place[i]))
+                if all(abs(at - other) >= _APART for other in found):
+                    found[at] = f"{value:g}"
+    return found
 
 
 def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any) -> None:
@@ -82,8 +111,8 @@ def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any) -> None:
     ax.contour(x, y, shown.T, levels=lines, colors=style.GREY, linewidths=0.5)
     bar = figure.colorbar(shades, ax=ax, pad=0.02, ticks=MaxNLocator(7))
     bar.formatter.set_powerlimits((-2, 3))  # pyright: ignore[reportAttributeAccessIssue]
-    bar.ax.yaxis.get_offset_text().set_fontsize(7.5)
-    bar.ax.tick_params(labelsize=7.5, width=0.6, length=3.0)
+    bar.ax.yaxis.get_offset_text().set(fontsize=7.5, fontfamily="STIXGeneral")
+    bar.ax.tick_params(labelsize=7.5, width=0.6, length=3.0, labelfontfamily="STIXGeneral")
     bar.outline.set_linewidth(0.6)  # pyright: ignore[reportCallIssue]
     bar.set_label("growth rate", fontsize=8.5, fontfamily="STIXGeneral")
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from chuteflow import __version__
 from chuteflow.analysis.results import FlowSet
@@ -13,14 +12,14 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import Scales
 
 
-def write(result: records.Result, path: Path, scales: Scales | None) -> None:
-    """Write ``result`` to ``path``; a single flow has the shape of a set of one."""
-    kept = [records.unknowns(row) for row in records.rows(result)]
+def write(result: records.Result, stream: BinaryIO, scales: Scales | None) -> None:
+    """Write ``result`` to ``stream``; a single flow has the shape of a set of one."""
+    found = records.rows(result)
     whole = _readable(result, scales) | {
         "source": f"chuteflow {__version__}",
-        "restore": records.head(result) | {"rows": kept},
+        "restore": records.head(result, found) | {"rows": [records.unknowns(row) for row in found]},
     }
-    path.write_text(contract.text(whole) + "\n", encoding="utf-8")
+    stream.write(contract.text(whole).encode() + b"\n")
 
 
 def read(path: Path) -> records.Result:
@@ -30,10 +29,9 @@ def read(path: Path) -> records.Result:
         InputError: for a later or unknown format.
         ValueError, KeyError, TypeError: for a file that is not of this format.
     """
-    kept = json.loads(path.read_text(encoding="utf-8"))["restore"]
-    records.require_format(kept)
-    chute = records.chute_from(kept["chute"])
-    return records.rebuilt(kept, [records.row_from(chute, row) for row in kept["rows"]])
+    kept = contract.parsed(path.read_bytes())["restore"]
+    rows = kept.pop("rows")
+    return records.restored(kept, rows)
 
 
 def _readable(result: records.Result, scales: Scales | None) -> dict[str, Any]:

@@ -6,38 +6,47 @@ holds the unknowns, those of all flows one after the other.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5netcdf
+import h5py
 import numpy as np
 
 from chuteflow import __version__
 from chuteflow.analysis.results import KINDS, Curve
-from chuteflow.faces import records
-from chuteflow.faces.contract import factor
+from chuteflow.checks import whole
+from chuteflow.errors import InputError
+from chuteflow.faces import contract, records
+from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
-from chuteflow.steady.quantities import FIELDS, NUMBERS, Quantity, Scales
+from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity, Scales
 from chuteflow.steady.solver import Status
+from chuteflow.steady.validity import WORDS
 
 _INTERIORS = ("dissipative", "mixed", "productive")
 _DENSITIES = ("monotonic", "inverted")
 _STATUS = tuple(Status)
+#: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
+_LARGEST = 50_000_000
+_INTEGERS = ("unknowns", "status", "branch", "special")
 _PER_FLOW = {"degree": "i4", "stretch": "f8", "error": "f8"}
 
 
-def write(result: Result, path: Path, scales: Scales | None) -> None:
-    """Write ``result`` to ``path``."""
+def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
+    """Write ``result`` to ``stream``, in memory: HDF5 may end the process where a disk is full."""
     found = records.rows(result)
-    with h5netcdf.File(path, "w") as file:
+    with h5netcdf.File(stream, "w") as file:
         file.dimensions = {"flow": len(found), "height_index": HEIGHTS}
         file.attrs.update(_attributes(result, scales))
         _write_numbers(file, found, scales)
         _write_kinds(file, found)
+        _write_validity(file, found)
         if isinstance(result, Curve):
             _write_branches(file, found)
         _write_profiles(file, found, scales)
@@ -51,27 +60,47 @@ def read(path: Path) -> Result:
         InputError: for a later or unknown format.
         OSError, ValueError, KeyError, TypeError: for a file that is not of this format.
     """
-    with h5netcdf.File(path, "r") as file:
-        group = file.groups["restore"]
-        head = json.loads(group.attrs["head"])
-        records.require_format(head)
-        columns = {name: variable[...] for name, variable in group.variables.items()}
-    chute = records.chute_from(head["chute"])
-    ends = np.cumsum(columns["unknowns"])
-    kinds = ("", *KINDS)
-    found = [
-        records.row_from(
-            chute,
-            {name: columns[name][i] for name in (*_PER_FLOW, "macroscopic", "branch")}
-            | {
-                "z": columns["z"][end - columns["unknowns"][i] : end],
-                "status": _STATUS[columns["status"][i]].name,
-                "special": kinds[columns["special"][i]],
-            },
-        )
-        for i, end in enumerate(ends)
-    ]
-    return records.rebuilt(head, found)
+    with restored_group(path) as group:
+        head = contract.parsed(group.attrs["head"])
+        columns = {name: group[name][...].tolist() for name in (*_PER_FLOW, *_INTEGERS, "z", "macroscopic")}
+    return records.restored(head, list(_rows(columns)))
+
+
+@contextmanager
+def restored_group(path: Path) -> Iterator[Any]:
+    """The group of a file that restores its result, once it is sure that it is not larger than any result.
+
+    It is read without h5netcdf, which leaves what it has of a damaged file to complain when it is collected.
+
+    Raises:
+        InputError: where a variable is too large: a file can claim any size.
+        OSError, KeyError: for a file that is damaged.
+    """
+    with h5py.File(path, "r") as file:
+        group: Any = file["restore"]
+        for name in group:
+            size = math.prod(group[name].shape)
+            if size > _LARGEST:
+                raise InputError(f"{name} claims {size} numbers")
+        yield group
+
+
+def _rows(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
+    """The values of each flow, as :func:`records.unknowns` gives them."""
+    lengths = [whole("the number of unknowns", length, 0) for length in columns["unknowns"]]
+    if sum(lengths) != len(columns["z"]):
+        raise InputError("a flow has the wrong number of unknowns")
+    statuses, kinds = [status.name for status in _STATUS], ("", *KINDS)
+    end = 0
+    for i, length in enumerate(lengths):
+        end += length
+        yield {name: columns[name][i] for name in ("degree", "stretch", "branch")} | {
+            "z": columns["z"][end - length : end],
+            "macroscopic": [finite(value) for value in columns["macroscopic"][i]],
+            "error": None if columns["error"][i] == math.inf else columns["error"][i],
+            "status": statuses[whole("status", columns["status"][i], 0, len(statuses) - 1)],
+            "special": kinds[whole("special", columns["special"][i], 0, len(kinds) - 1)],
+        }
 
 
 def _attributes(result: Result, scales: Scales | None) -> dict[str, Any]:
@@ -95,7 +124,7 @@ def _attributes(result: Result, scales: Scales | None) -> dict[str, Any]:
         attributes |= {
             "searched_surface_temperature": np.array(result.searched.surface_temperature),
             "searched_largest_holdup": result.searched.largest_holdup,
-            "searched_comment": "dimensionless range in which no flow was missed",
+            "searched_comment": "dimensionless range in which flows were searched for",
             "tolerance": result.tolerance,
             "tolerance_comment": "relative error allowed in Q, h and M",
             "reason": result.reason or "",
@@ -126,6 +155,23 @@ def _write_kinds(file: h5netcdf.File, found: Sequence[Row]) -> None:
     _write_flags(file, "status", status, [s.name.lower() for s in _STATUS], "how the solution ended")
 
 
+def _write_validity(file: h5netcdf.File, found: Sequence[Row]) -> None:
+    """Numbers that tell how far flows keep to the theory, and a bit for each limit that is passed."""
+    known = [row.flow.validity for row in found]
+    for name, quantity in VALIDITY.items():
+        values = np.array([getattr(one, name) for one in known], dtype="f8")
+        _write(file, name, ("flow",), values, {"units": "1", "long_name": quantity.description})
+    bits = {word: 1 << i for i, word in enumerate(WORDS)}
+    attributes = {
+        "long_name": "limits of the theory that are passed",
+        "flag_masks": np.array([*bits.values()], dtype="i1"),
+        "flag_meanings": " ".join(word.partition(":")[0].replace(" ", "_") for word in WORDS),
+        "comment": "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items()),
+    }
+    passed = np.array([sum(bits[word] for word in one.words) for one in known], dtype="i1")
+    _write(file, "validity", ("flow",), passed, attributes)
+
+
 def _write_branches(file: h5netcdf.File, found: Sequence[Row]) -> None:
     branch = np.array([row.branch for row in found], dtype="i4")
     attributes = {"long_name": "number of the family of flows", "units": "1"}
@@ -149,7 +195,7 @@ def _write_profiles(file: h5netcdf.File, found: Sequence[Row], scales: Scales | 
 def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row]) -> None:
     solutions = [row.flow.solution for row in found]
     group.attrs["long_name"] = "discretised unknowns, from which chuteflow rebuilds the flows to the last bit"
-    group.attrs["head"] = json.dumps(records.head(result), allow_nan=False)
+    group.attrs["head"] = contract.text(records.head(result, found))
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -10,6 +10,8 @@ import click
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
@@ -30,7 +32,7 @@ _MATERIAL = {
 _CONDITIONS = {
     "flux": ("Q", "mass_flux"),
     "holdup": ("M", "mass_holdup"),
-    "depth": ("h", "centre_of_mass"),
+    "centre_of_mass": ("h", "centre_of_mass"),
     "temperature": ("T_surface", "surface_temperature"),
 }
 _SCALES = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
@@ -108,7 +110,7 @@ chute_options = _options(
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
     option("--holdup", metavar="AMOUNT", help="Mass hold-up M, mass per unit area of the base."),
-    option("--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
+    option("--centre-of-mass", "--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
     option("--temperature", metavar="AMOUNT", help="Granular temperature far above, or at the interface."),
 )
 search_range_options = _options(
@@ -185,14 +187,19 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
     """
     named = [name for name in _CONDITIONS if given[name] is not None]
     if not named:
-        raise InputError("missing one of --flux, --holdup, --depth and --temperature, for example --flux 3")
+        raise InputError("missing one of --flux, --holdup, --centre-of-mass and --temperature, for example --flux 3")
     if len(named) > 1:
-        both = " and ".join(f"--{name} {given[name]}" for name in named)
-        raise InputError(f"{both}: give one of --flux, --holdup, --depth and --temperature, and no other")
+        both = " and ".join(f"{_written(name)} {given[name]}" for name in named)
+        raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
     from chuteflow.faces.units import read_amount
 
     argument, quantity = _CONDITIONS[named[0]]
-    return {argument: read_amount(f"--{named[0]}", given[named[0]], quantity, scales, chute.slope)}
+    return {argument: read_amount(_written(named[0]), given[named[0]], quantity, scales, chute.slope)}
+
+
+def _written(name: str) -> str:
+    """A parameter of a command as it is typed."""
+    return f"--{name.replace('_', '-')}"
 
 
 def chosen(found: FlowSet, which: int | None) -> Flow:
@@ -218,14 +225,40 @@ def search(given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in arguments.items() if value is not None}
 
 
-def require_outputs(given: Mapping[str, Any]) -> None:
-    """Check before anything is computed that --save and --plot can be written.
+def deliver(given: Mapping[str, Any], answer: str, save: Callable[[str], None], plot: Callable[[], Figure]) -> None:
+    """Write the files that --save and --plot name, and print the answer, which no full disk is to cost.
+
+    Raises:
+        InputError: once the answer is printed, for files that could not be written.
+    """
+
+    def draw(path: str) -> None:
+        from chuteflow.faces.plots import write_figure
+        from chuteflow.paper import style
+
+        with style.own_settings():
+            write_figure(plot(), path)
+
+    failures = []
+    for name, write in (("save", save), ("plot", draw)):
+        if given[name] is not None:
+            try:
+                write(given[name])
+            except InputError as error:
+                failures.append(str(error))
+    click.echo(answer)
+    if failures:
+        raise InputError("; ".join(failures))
+
+
+def require_outputs(given: Mapping[str, Any], saved: Sequence[str] = SAVED) -> None:
+    """Check before anything is computed that --save, with an ending of ``saved``, and --plot can be written.
 
     Raises:
         InputError: for a file that cannot.
     """
     from chuteflow.faces.writing import require_writable
 
-    for name, suffixes in (("save", SAVED), ("plot", DRAWN)):
+    for name, suffixes in (("save", saved), ("plot", DRAWN)):
         if given[name] is not None:
             require_writable(given[name], suffixes)

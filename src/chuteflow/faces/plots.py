@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from io import BytesIO
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow.analysis.results import KINDS, Curve, FlowSet
+from chuteflow.analysis.results import KINDS, Branch, Curve, FlowSet
 from chuteflow.faces import words
 from chuteflow.faces.contract import PLACE, factor
 from chuteflow.faces.tables import number
-from chuteflow.faces.writing import require_writable, written_beside
+from chuteflow.faces.writing import require_writable, write_whole
 from chuteflow.paper import style
-from chuteflow.paper.branches import runs
+from chuteflow.paper.branches import in_order, runs, smooth
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
@@ -41,14 +43,17 @@ _TOP = 2.5
 _MARKERS = {
     "fold-Q": ("o", "fold in $Q$"),
     "fold-M": ("s", "fold in $M$"),
-    "fold-T": ("^", r"fold in $T_\infty$"),
+    "fold-T": ("^", f"fold in ${NUMBERS['surface_temperature'].latex}$"),
     "density-inversion": ("D", "onset of density inversion"),
     "interior-change": ("v", "change of interior"),
     "stability-change": ("P", "change of stability"),
 }
+#: What lies beneath the stretches of a curve whose flows pass these limits of the theory.
+_HALOS = {"packed: beyond the theory": "#adadad", "dense: beyond the theory": "#d6d6d6", "layered": "#f6cf97"}
 _RESOLUTION = 300
 
 
+@style.own_settings()
 def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     """Profiles of volume fraction, temperature and velocity, each flow with its own colour and dashes.
 
@@ -65,7 +70,7 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
             ax.plot(
                 getattr(profile, field) * factor(field, chute, scales),
                 profile.height * factor("height", chute, scales),
-                label=f"{words.among(flow, flow_set)}: {_numbers_of(flow, chute, scales)}",
+                label=f"{words.among(flow, flow_set)}: {_numbers_of(flow, chute, scales)}; {flow.validity.summary}",
                 **style.stroke(i).line(),
             )
     for ax, field in zip(axes, _FIELDS, strict=True):
@@ -77,6 +82,7 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
     return figure
 
 
+@style.own_settings()
 def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
     """Centre of mass, hold-up and flux against one another along every branch, special points marked.
 
@@ -87,17 +93,19 @@ def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
         return _none(curve.chute, curve.reason)
     figure, axes = style.panels(3, height=3.2)
     for ax, pair in zip(axes, _PANELS, strict=True):
+        shade_beyond(ax, curve, pair, scales)
         for i, branch in enumerate(curve.branches):
             colour = _colour(i, curve)
             for run in runs(branch):
-                x, y = (values(run.flows, name, curve, scales) for name in pair)
-                ax.plot(x, y, **style.Stroke(colour, style.OF_DENSITY[run.density]).line())
+                ax.plot(
+                    *line(run.flows, pair, curve, scales), **style.Stroke(colour, style.OF_DENSITY[run.density]).line()
+                )
         mark(ax, curve, pair, scales)
         for axis, name in zip("xy", pair, strict=True):
             style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
         style.name_axes(ax, *(style.label(name, scales) for name in pair))
     style.caption(figure, parameters(curve.chute))
-    style.legend(figure, handles=list(_key(curve)), loc="outside lower center", ncols=4)
+    style.legend(figure, handles=[*_key(curve), *key_of_beyond(curve)], loc="outside lower center", ncols=4)
     return figure
 
 
@@ -110,8 +118,10 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     suffix = require_writable(path, SUFFIXES)
     # Pictures of one result are the same bytes, whenever they are drawn.
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(suffix, {})
-    with written_beside(path) as partial:
-        figure.savefig(partial, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    stream = BytesIO()
+    with style.own_settings():
+        figure.savefig(stream, format=suffix[1:], dpi=_RESOLUTION, metadata=undated)
+    write_whole(path, stream.getvalue())
 
 
 def _none(chute: Chute, reason: str | None) -> Figure:
@@ -140,6 +150,43 @@ def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:
 def values(flows: Sequence[Any], name: str, curve: Curve, scales: Scales | None) -> Any:
     """A number of the registry of each flow, scaled."""
     return np.array([getattr(flow, name) for flow in flows]) * factor(name, curve.chute, scales)
+
+
+def line(flows: Sequence[Any], pair: tuple[str, str], curve: Curve, scales: Scales | None) -> list[Any]:
+    """Two numbers of neighbouring flows of a branch as a smooth line, scaled."""
+    drawn = smooth(flows)
+    return [drawn[name] * factor(name, curve.chute, scales) for name in pair]
+
+
+def shade_beyond(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:
+    """Underlay the stretches whose flows are too dense for the theory, or whose density turns more than once."""
+    for branch in curve.branches:
+        for word, flows in _beyond(branch):
+            ax.plot(*line(flows, pair, curve, scales), **_halo(word))
+
+
+def key_of_beyond(curve: Curve) -> Iterator[Any]:
+    """Entries of the legend for what :func:`shade_beyond` underlays."""
+    from matplotlib.lines import Line2D
+
+    found = {word for branch in curve.branches for word, _ in _beyond(branch)}
+    for word in _HALOS:
+        if word in found:
+            yield Line2D([], [], label=word, **_halo(word))
+
+
+def _beyond(branch: Branch) -> Iterator[tuple[str, list[Flow]]]:
+    flows = [point.flow for point in in_order(branch)]
+    passed = [set(flow.validity.words) for flow in flows]
+    for word in _HALOS:
+        for holds, indices in groupby(range(len(flows)), key=lambda i, word=word: word in passed[i]):
+            stretch = [flows[i] for i in indices]
+            if holds:
+                yield word, stretch
+
+
+def _halo(word: str) -> dict[str, Any]:
+    return {"color": _HALOS[word], "linewidth": 5.0, "solid_capstyle": "butt", "zorder": 0.5}
 
 
 def mark(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:

@@ -6,21 +6,30 @@ error, status) of every flow.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from chuteflow.analysis.ranges import Range
 from chuteflow.analysis.results import KINDS, Branch, Curve, FlowSet, Searched, SpecialPoint
+from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError
 from chuteflow.faces.contract import PARAMETERS, chute_object, finite
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.paper.branches import in_order
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import Collocation
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import Solution, Status
+from chuteflow.steady.solver import DEGREES, Solution, Status, checked_tolerance
+from chuteflow.theory.constitutive import Law, fingerprint
+from chuteflow.theory.laws import law
 
 #: What can be saved and loaded, and its names in the files.
 Result = Flow | FlowSet | Curve
@@ -32,8 +41,12 @@ HEIGHTS = 101
 FORMAT = 1
 #: Largest difference of ln Q, ln h, ln M and ln T_surface between a file and the flow rebuilt from it.
 _AGREEMENT = 1e-6
-#: Degree of the finest grid that is believed.
-_FINEST = 10_000
+#: Largest stretch that is believed: that of a hold-up at which nothing is searched over the coldest temperature.
+_LARGEST_STRETCH = 100.0
+#: Relative difference of values of one law on two machines.
+_SAME_LAW = 1e-9
+#: Names in the head of a file.
+LAW, CHECKSUM = "law", "checksum"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +67,13 @@ def rows(result: Result) -> list[Row]:
     return [Row(point.flow, i, point.special) for i, branch in enumerate(result.branches) for point in in_order(branch)]
 
 
-def head(result: Result) -> dict[str, Any]:
-    """All that a file keeps beside the rows, as JSON values."""
+def head(result: Result, found: Sequence[Row]) -> dict[str, Any]:
+    """All that a file keeps beside the rows ``found``, as JSON values."""
     kept: dict[str, Any] = {
         "format": FORMAT,
         "kind": KIND_OF[type(result)],
         "chute": chute_object(result.chute),
+        LAW: fingerprint_of(result.chute, found[0].flow.law if found else None),
     }
     if not isinstance(result, Flow):
         kept |= {
@@ -74,7 +88,58 @@ def head(result: Result) -> dict[str, Any]:
         kept["incomplete"] = result.incomplete
     if isinstance(result, Curve):
         kept["ends"] = [list(branch.ends) for branch in result.branches]
-    return kept
+    return kept | {CHECKSUM: checksum(kept, map(unknowns, found))}
+
+
+def checksum(kept: Mapping[str, Any], rows: Iterable[Mapping[str, Any]] = ()) -> str:
+    """What tells whether anything was changed that a result is restored from."""
+    found = hashlib.sha256(json.dumps(kept, sort_keys=True).encode())
+    for row in rows:
+        found.update(json.dumps(row, sort_keys=True).encode())
+    return found.hexdigest()
+
+
+def require_checksum(kept: Mapping[str, Any], rows: Iterable[Mapping[str, Any]] = ()) -> None:
+    """Check what a file keeps against its checksum. Files of chuteflow 0.1 have none.
+
+    Raises:
+        InputError: where it is another.
+    """
+    rest = {name: value for name, value in kept.items() if name != CHECKSUM}
+    if CHECKSUM in kept and kept[CHECKSUM] != checksum(rest, rows):
+        raise InputError("it is damaged, or was changed: its checksum is that of other numbers")
+
+
+def fingerprint_of(chute: Chute, registered: Law | None = None) -> list[float]:
+    """Values of the law of ``chute``, by default the one that has its name now."""
+    return fingerprint(registered or law(chute.closure), chute.restitution, chute.slope)
+
+
+def require_law(chute: Chute, kept: Mapping[str, Any]) -> None:
+    """Check that the law of a file is the one that has its name now. Files of chuteflow 0.1 do not tell.
+
+    Raises:
+        InputError: where it is another.
+    """
+    if LAW not in kept:
+        return
+    values, now = numbers("the law", kept[LAW]), np.array(fingerprint_of(chute))
+    if values.shape != now.shape or not np.allclose(values, now, rtol=_SAME_LAW, atol=0.0):
+        raise InputError(
+            f"it was written with another law than the one that is now registered under the name {chute.closure!r}: "
+            "register that one to load it, or compute it again"
+        )
+
+
+def numbers(what: str, values: Any) -> Array:
+    """A list of finite numbers as an array.
+
+    Raises:
+        InputError: for what is none.
+    """
+    if not isinstance(values, list):
+        raise InputError(f"{what}: must be a list of numbers")
+    return np.array([number(what, value) for value in values])
 
 
 def unknowns(row: Row) -> dict[str, Any]:
@@ -98,48 +163,81 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     Raises:
         InputError: where the unknowns are not those of the flow they claim to be.
     """
-    problem = Collocation(model(chute), int(kept["degree"]), float(kept["stretch"]))
-    z = np.array(kept["z"], dtype=float)
-    macroscopic = np.array([np.nan if v is None else v for v in kept["macroscopic"]], dtype=float)
-    if not 2 <= problem.degree <= _FINEST or z.shape != (problem.degree + 3,) or macroscopic.shape != (4,):
+    # Everything is checked before anything is computed with it: a grid takes the square of its degree in memory.
+    degree = whole("the degree of a flow", kept["degree"], 2, max(DEGREES))
+    stretch = number("the stretch of a flow", kept["stretch"], 0.0, _LARGEST_STRETCH)
+    if len(kept["z"]) != degree + 3 or len(kept["macroscopic"]) != 4:
         raise InputError("a flow has the wrong number of unknowns")
-    error = np.inf if kept["error"] is None else float(kept["error"])
-    solution = Solution(problem, z, macroscopic, error, Status[kept["status"]])
+    z = numbers("the unknowns of a flow", kept["z"])
+    if kept["status"] not in Status.__members__:
+        raise InputError(f"a flow has the unknown status {shown(kept['status'])}")
+    status = Status[kept["status"]]
+    logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
+    error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
+    solution = Solution(Collocation(model(chute), degree, stretch), z, np.array(logarithms), error, status)
     if solution.converged:
         with np.errstate(all="ignore"):
-            distance = np.abs(problem.state(z).macroscopic() - macroscopic).max()
+            distance = np.abs(solution.problem.state(z).macroscopic() - solution.macroscopic).max()
         if not distance <= _AGREEMENT:
             raise InputError("the unknowns of a flow do not give its mass flux, centre of mass and hold-up")
-    return Row(Flow(chute, solution), int(kept["branch"]), str(kept["special"]))
+    if kept["special"] and kept["special"] not in KINDS:
+        raise InputError(f"it holds an unknown kind of special point, {shown(kept['special'])}")
+    return Row(Flow(chute, solution), whole("the branch of a flow", kept["branch"], 0), str(kept["special"]))
 
 
-def chute_from(kept: dict[str, Any]) -> Chute:
+def chute_from(kept: Mapping[str, Any]) -> Chute:
     """The chute that ``chute_object`` came from."""
     return Chute(**{name: kept[short] for short, name in PARAMETERS.items()})
 
 
-def rebuilt(kept: dict[str, Any], found: Sequence[Row]) -> Result:
+def restored(kept: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> Result:
     """The result with this head and these rows.
 
     Raises:
-        InputError: for a head of a later format, or rows that do not fit it.
+        InputError: for a head of a later format, numbers out of range, or rows that do not fit it.
     """
-    kind, chute = kept["kind"], chute_from(kept["chute"])
+    require_format(kept)
+    chute = chute_from(kept["chute"])
+    require_law(chute, kept)
+    found = [row_from(chute, row) for row in rows]
+    result = _result(chute, kept, found)
+    require_checksum(kept, map(unknowns, found))
+    return result
+
+
+def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Result:
+    kind = kept["kind"]
     if kind == "flow":
-        (row,) = found
-        return row.flow
-    low, high = kept["searched"]["surface_temperature"]
-    searched = Searched((float(low), float(high)), float(kept["searched"]["largest_holdup"]))
+        if len(found) != 1:
+            raise InputError(f"it holds {len(found)} flows in the place of one")
+        return found[0].flow
+    within = Range.checked(kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface)
+    searched = Searched((within.coldest, within.hottest), within.deepest)
+    tolerance, reason = checked_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
     if kind == "flows":
-        told = float(kept["tolerance"]), kept["reason"], kept.get("incomplete")
-        return FlowSet(chute, tuple(row.flow for row in found), searched, *told)
+        flows = tuple(row.flow for row in found)
+        for one, two in pairwise(flows):
+            if one.surface_temperature < two.surface_temperature or _same(one, two):
+                raise InputError("its flows are not from hot to cold, each once")
+        return FlowSet(chute, flows, searched, tolerance, reason, _sentence("incomplete", kept.get("incomplete")))
     if kind != "curve":
-        raise InputError(f"it holds an unknown kind of result, {kind!r}")
-    branches = [
-        _branch([row for row in found if row.branch == i], (str(begin), str(end)))
-        for i, (begin, end) in enumerate(kept["ends"])
-    ]
-    return Curve(chute, tuple(branches), searched, float(kept["tolerance"]), kept["reason"])
+        raise InputError(f"it holds an unknown kind of result, {shown(kind)}")
+    ends = [(str(begin), str(end)) for begin, end in kept["ends"]]
+    if any(row.branch >= len(ends) for row in found):
+        raise InputError("it holds flows of a branch that is not in it")
+    branches = [_branch([row for row in found if row.branch == i], at) for i, at in enumerate(ends)]
+    return Curve(chute, tuple(branches), searched, tolerance, reason)
+
+
+def _sentence(name: str, value: Any) -> str | None:
+    if not (value is None or isinstance(value, str)):
+        raise InputError(f"{name} = {shown(value)}: must be a sentence or null")
+    return value
+
+
+def _same(one: Flow, two: Flow) -> bool:
+    """Whether two flows are one and the same to the last bit."""
+    return np.array_equal(one.solution.macroscopic, two.solution.macroscopic)
 
 
 def require_format(kept: Mapping[str, Any]) -> None:
@@ -148,21 +246,30 @@ def require_format(kept: Mapping[str, Any]) -> None:
     Raises:
         InputError: for a later one.
     """
-    if int(kept["format"]) > FORMAT:
+    found = whole("format", kept["format"], 1)
+    if found > FORMAT:
         raise InputError(
-            f"it was written by a later chuteflow (format {kept['format']}, this one reads up to {FORMAT}): "
-            "update chuteflow"
+            f"it was written by a later chuteflow (format {found}, this one reads up to {FORMAT}): update chuteflow"
         )
 
 
-def _branch(found: Iterable[Row], ends: tuple[str, str]) -> Branch:
+def _branch(found: Sequence[Row], ends: tuple[str, str]) -> Branch:
+    """The branch of these rows.
+
+    Raises:
+        InputError: for one without flows, or with one of them twice in a row.
+    """
     flows: list[Flow] = []
     special: list[SpecialPoint] = []
     for row in found:
         if not row.special:
+            if flows and _same(flows[-1], row.flow):
+                raise InputError("it holds a flow twice")
             flows.append(row.flow)
-        elif row.special in KINDS and flows:
+        elif flows:
             special.append(SpecialPoint(row.special, row.flow, len(flows) - 1))
         else:
-            raise InputError(f"it holds an unknown kind of special point, {row.special!r}")
+            raise InputError("it holds a branch that begins with a special point")
+    if not flows:
+        raise InputError("it holds a branch without flows")
     return Branch(tuple(flows), tuple(special), ends)

@@ -17,6 +17,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from chuteflow import __version__
+from chuteflow.paper import style
 from chuteflow.paper.claims import VERDICTS, Verdict, shown
 from chuteflow.paper.facts import Facts
 
@@ -54,6 +55,7 @@ class Report:
     seconds: float
 
 
+@style.own_settings()
 def picture(figure: Figure) -> str:
     """A figure as a data address that holds it as SVG."""
     buffer = BytesIO()

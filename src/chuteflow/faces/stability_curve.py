@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from chuteflow.faces.contract import PLACE, factor
-from chuteflow.faces.plots import key_of_kinds, mark, parameters, values
+from chuteflow.faces.plots import key_of_beyond, key_of_kinds, line, mark, parameters, shade_beyond
 from chuteflow.faces.stability_records import mode_object
 from chuteflow.faces.tables import number
 from chuteflow.paper import style
@@ -37,6 +37,7 @@ _WORDS = {
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"))
 
 
+@style.own_settings()
 def plot_marked(marked: MarkedCurve, *, scales: Scales | None = None) -> Figure:
     """Centre of mass and hold-up against flux: solid where flows are stable, dashed where not."""
     curve = marked.curve
@@ -44,16 +45,21 @@ def plot_marked(marked: MarkedCurve, *, scales: Scales | None = None) -> Figure:
         return style.sentence(f"No flow: {curve.reason}.")
     figure, axes = style.panels(2, width=7.2, height=3.6)
     for ax, pair in zip(axes, _PANELS, strict=True):
+        shade_beyond(ax, curve, pair, scales)
         for branch in marked.branches:
             for run in branch.runs:
-                x, y = (values(run.flows, name, curve, scales) for name in pair)
-                ax.plot(x, y, **_STROKES[run.label].line())
+                ax.plot(*line(run.flows, pair, curve, scales), **_STROKES[run.label].line())
         mark(ax, curve, pair, scales)
         for axis, name in zip("xy", pair, strict=True):
             style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
         style.name_axes(ax, *(style.label(name, scales) for name in pair))
     style.caption(figure, parameters(curve.chute))
-    style.legend(figure, handles=[*_key(marked), *key_of_kinds(curve)], loc="outside lower center", ncols=3)
+    style.legend(
+        figure,
+        handles=[*_key(marked), *key_of_kinds(curve), *key_of_beyond(curve)],
+        loc="outside lower center",
+        ncols=3,
+    )
     return figure
 
 

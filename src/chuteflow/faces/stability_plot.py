@@ -27,6 +27,7 @@ _PHASES, _ARROWS, _SHADES = 97, (17, 13), 13
 _NOTHING = 1e-9
 
 
+@style.own_settings()
 def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]

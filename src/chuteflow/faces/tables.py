@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
+from chuteflow.display import number
 from chuteflow.faces.contract import factor
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
-
-
-def number(value: float) -> str:
-    """Five significant digits, or a dash for what is not a finite number."""
-    return f"{value:.5g}" if math.isfinite(value) else "-"
 
 
 def heading(names: Sequence[str], scales: Scales | None) -> list[list[str]]:

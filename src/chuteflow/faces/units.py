@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, Scales
@@ -50,7 +51,6 @@ class FlowInUnits:
         return {name: self._with_unit(name, getattr(profile, name)) for name in FIELDS}
 
     def _at(self, z: Any) -> Profile:
-        import numpy as np
         import pint
 
         if isinstance(z, pint.Quantity):
@@ -58,7 +58,7 @@ class FlowInUnits:
                 z = z.m_as("m")
             except pint.PintError:
                 raise InputError(f"heights in {z.units}: must be lengths") from None
-        return self.flow.profile(np.asarray(z, dtype=float) / self._factor("height"))
+        return self.flow.profile(real_array("z", z) / self._factor("height"))
 
     def _factor(self, name: str) -> float:
         return self.scales.factor(name, self.flow.chute.slope)

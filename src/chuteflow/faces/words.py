@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from chuteflow.analysis.counting import Count, flux_counts
 from chuteflow.analysis.results import Curve, Searched
@@ -12,15 +13,8 @@ from chuteflow.faces.tables import number
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.validity import WORDS
 
-#: What the flow with the largest and the one with the smallest of a number is called among others.
-_SIDES = (
-    ("surface_temperature", "hot", "cold"),
-    ("largest_volume_fraction", "dense", "dilute"),
-    ("centre_of_mass", "deep", "shallow"),
-)
-#: Relative differences below this distinguish nothing.
-_EQUAL = 1e-6
 _DENSITIES = {
     "monotonic": "density falls with height everywhere (monotonic)",
     "inverted": "densest above the base (density inverted)",
@@ -34,15 +28,27 @@ _SURFACES = {"free": "free surface", "interface": "interface with free grains ab
 
 
 def among(flow: Flow, flows: Sequence[Flow]) -> str:
-    """What tells ``flow`` from the others, such as "hot, dilute, deep"."""
-    if len(flows) < 2:
-        return "the only flow"
-    told = []
-    for name, largest, smallest in _SIDES:
-        values = [getattr(other, name) for other in flows]
-        if max(values) - min(values) > _EQUAL * max(values):
-            told += {max(values): [largest], min(values): [smallest]}.get(getattr(flow, name), [])
-    return ", ".join(told) if told else "in between"
+    """The name of ``flow``; where others of them have the same one, its number among these, in their order."""
+    alike = [other for other in flows if other.name == flow.name]
+    return flow.name if len(alike) < 2 else f"{flow.name} ({alike.index(flow) + 1} of {len(alike)})"
+
+
+def notes(flows: Sequence[Flow]) -> list[str]:
+    """What the columns and words of a table of ``flows`` mean that do not explain themselves."""
+    said = {word for flow in flows for word in flow.validity.words}
+    depth = "that of the interface, or " if any(flow.chute.surface == "interface" for flow in flows) else ""
+    return [
+        f"depth: {depth}the height above which nu is below 1 % of nu_max; the centre of mass is h",
+        *(f"{word}: {meaning}" for word, meaning in WORDS.items() if word in said),
+    ]
+
+
+def validity(flows: Sequence[Flow], chute: Chute, scales: Scales | None) -> Iterator[str]:
+    """How far the flows of a family keep to the theory, a line for each stretch of their surface temperatures."""
+    warmth = factor("surface_temperature", chute, scales)
+    for summary, stretch in groupby(flows, key=lambda flow: flow.validity.summary):
+        ends = [flow.surface_temperature * warmth for flow in stretch]
+        yield f"from T_surface = {number(ends[0])} to {number(ends[-1])}: {summary}"
 
 
 def kinds(flow: Flow) -> str:

@@ -1,28 +1,41 @@
-"""Files that are whole or absent: written beside their place, and renamed into it."""
+"""Files that are whole or absent: made in memory, written apart, and put in their place by one step."""
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
+import platform
+import re
 import secrets
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
+from typing import BinaryIO, TextIO
 
 from chuteflow.errors import InputError
 
+#: Names of files that are being written: machine, process and random digits.
+_PARTIAL = re.compile(r"\.chuteflow-([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{12}(?:\.\w+)?")
+#: What a file system says that has no files without names, or no way to name them.
+_NOT_HERE = (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL, errno.ENOENT, errno.ENOSYS, errno.EXDEV, errno.EPERM)
 
-@contextmanager
-def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path beside ``path`` to write to; it takes the place of ``path`` if the block ends without error.
+
+def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
+    """Write ``content``, text as UTF-8, to ``path``; what was there is replaced in one step, or stays as it was.
 
     Raises:
         InputError: where the file cannot be written; nothing is left behind.
     """
+    data = content.encode() if isinstance(content, str) else content
     target = _target(path)
     partial = _beside(target)
     try:
-        yield partial
+        _remove_abandoned(target.parent)
+        if not _written_unnamed(partial, data):
+            _written_named(partial, data)
         if target.exists():
             shutil.copymode(target, partial)
         partial.replace(target)
@@ -31,6 +44,14 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             partial.unlink()
+
+
+@contextmanager
+def as_text(stream: BinaryIO) -> Iterator[TextIO]:
+    """``stream`` as one of text in UTF-8, whose lines end as they are written."""
+    text = TextIOWrapper(stream, encoding="utf-8", newline="")
+    yield text
+    text.detach()
 
 
 def require_writable(path: str | os.PathLike[str], suffixes: Sequence[str]) -> str:
@@ -42,8 +63,12 @@ def require_writable(path: str | os.PathLike[str], suffixes: Sequence[str]) -> s
     suffix = require_suffix(path, suffixes)
     trial = _beside(_target(path))
     try:
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        descriptor = _unnamed(trial.parent)
+        if descriptor is None:
+            trial.touch(exist_ok=False)
+            trial.unlink()
+        else:
+            os.close(descriptor)
     except OSError as error:
         raise _cannot_write(path, error) from None
     return suffix
@@ -71,13 +96,88 @@ def _target(path: str | os.PathLike[str]) -> Path:
             raise InputError(f"cannot write {path}: it is write-protected")
         if not target.parent.is_dir():
             raise InputError(f"cannot write {path}: there is no directory {target.parent}")
+    except ValueError as error:
+        raise InputError(f"cannot write {str(path)!r}: {error}") from None
     except OSError as error:
         raise _cannot_write(path, error) from None
     return target
 
 
+def _unnamed(folder: Path) -> int | None:
+    """A descriptor of a new file in ``folder`` that has no name, and so never outlives its process; None where the
+    system has no such files."""
+    flag = getattr(os, "O_TMPFILE", None)
+    if flag is None:
+        return None
+    try:
+        return os.open(folder, flag | os.O_WRONLY, 0o666)
+    except OSError as error:
+        if error.errno in _NOT_HERE:
+            return None
+        raise
+
+
+def _written_unnamed(partial: Path, data: bytes) -> bool:
+    """Write a file without a name, and name it ``partial`` once it is whole; whether the system can."""
+    descriptor = _unnamed(partial.parent)
+    if descriptor is None:
+        return False
+    with os.fdopen(descriptor, "wb") as file:
+        _fill(file, data)
+        folder = os.open(partial.parent, os.O_RDONLY)
+        try:
+            # With a folder of its own the call follows the link to the file, and without it does not.
+            os.link(f"/proc/self/fd/{descriptor}", partial.name, dst_dir_fd=folder, follow_symlinks=True)
+        except OSError as error:
+            if error.errno in _NOT_HERE:
+                return False
+            raise
+        finally:
+            os.close(folder)
+    return True
+
+
+def _written_named(partial: Path, data: bytes) -> None:
+    with partial.open("xb") as file:
+        _fill(file, data)
+
+
+def _fill(file: BinaryIO, data: bytes) -> None:
+    file.write(data)
+    file.flush()
+    # A disk that is full may say so only now.
+    os.fsync(file.fileno())
+
+
 def _beside(target: Path) -> Path:
-    return target.with_name(f".chuteflow-{secrets.token_hex(6)}{target.suffix}")
+    return target.with_name(f".chuteflow-{_machine()}-{os.getpid()}-{secrets.token_hex(6)}{target.suffix}")
+
+
+def _machine() -> str:
+    """This machine in a few digits: numbers of processes mean nothing on another that shares the folder."""
+    return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what processes that were killed have left in ``folder``."""
+    if os.name != "posix":
+        return  # elsewhere there is no harmless way to ask whether a process lives
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            found = _PARTIAL.fullmatch(entry.name)
+            if found and found[1] == _machine() and not _alive(int(found[2])):
+                with suppress(OSError):
+                    os.unlink(entry.path)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def _cannot_write(path: str | os.PathLike[str], error: OSError) -> InputError:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
 
 from chuteflow.numerics.chebyshev import Array
 
@@ -108,8 +109,6 @@ def refined(matrix: Complex, weights: Array, near: complex, steps: int = 5) -> t
 
     ``near`` is to be much closer to it than to all others, such as its value in another discretisation.
     """
-    from scipy.linalg import lu_factor, lu_solve
-
     shifted = matrix.astype(complex)
     # Off the eigenvalue by more than rounding, so that the factors are regular.
     shift = near + 1e-9 * (1.0 + abs(near))

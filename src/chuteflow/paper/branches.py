@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar, overload
+
+import numpy as np
 
 from chuteflow import Branch, Flow
 from chuteflow.paper.sources import SteadyBranch, SteadyFlow
+
+#: The numbers in which a branch is one smooth line, and places on it between two flows that are drawn.
+NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+_BETWEEN = 10
 
 F = TypeVar("F", bound=SteadyFlow, covariant=True)
 
@@ -54,3 +60,21 @@ def runs(branch: SteadyBranch) -> list[Run]:
             kind = {"inverted": "monotonic", "monotonic": "inverted"}[kind] if turns else point.flow.density
             current = [point.flow]
     return [*found, Run(kind, tuple(current))]
+
+
+def smooth(flows: Sequence[SteadyFlow]) -> dict[str, Any]:
+    """Neighbouring flows of a branch as a line to be drawn: each of NUMBERS, with places between the flows.
+
+    The places are those of a cubic spline through the logarithms of all four numbers over the length of their chords,
+    which stays smooth where the branch folds in one of them.
+    """
+    from scipy.interpolate import CubicSpline
+
+    logs = np.log([[getattr(flow, name) for name in NUMBERS] for flow in flows])
+    steps = np.linalg.norm(np.diff(logs, axis=0), axis=1)
+    kept = np.append(True, steps > 0.0)
+    if np.count_nonzero(kept) < 2:
+        return dict(zip(NUMBERS, np.exp(logs).T, strict=True))
+    way = np.append(0.0, np.cumsum(steps))[kept]
+    places = np.interp(np.arange(_BETWEEN * (len(way) - 1) + 1) / _BETWEEN, np.arange(len(way)), way)
+    return dict(zip(NUMBERS, np.exp(CubicSpline(way, logs[kept])(places)).T, strict=True))

@@ -28,10 +28,10 @@ CAPTIONS = {
     "the dashed line, h ~ Q².",
     11: "The parameters λ and δ of the reduced model of hot flows against the slope. Hot flows of a dissipative "
     "interior (δ > 0) need 0 < λ < 3; inverted densities begin at λ = 0.660. λ diverges where δ vanishes.",
-    12: "A hot flow on the slope 0.3, T∞ = 50: the full equations (solid) and the expansion of the reduced model to "
-    "λ² (dashed), with the misprint of (4.23) mended.",
-    13: "A hot flow on the slope where λ = 1, T∞ = 100: the full equations (solid) and the exact solution of the "
-    "reduced model (dashed). Both have an inverted density.",
+    12: "A hot flow on the slope 0.3, T_surface = 50: the full equations (solid) and the expansion of the reduced "
+    "model to λ² (dashed), with the misprint of (4.23) mended.",
+    13: "A hot flow on the slope where λ = 1, T_surface = 100: the full equations (solid) and the exact solution of "
+    "the reduced model (dashed). Both have an inverted density.",
     14: "Where flows exist, in the plane of slope and roughness: e = e_w = 0.8 (a), e = 0.9 and e_w = 0.6 (b). Rings "
     "mark flows of the full equations at four surface temperatures, the hotter the wider. Curves are bounds of "
     "hot flows: λ = 0 and the exact λ = 3 (solid), the printed λ = 2.284 (dashed), the onset of inversion λ = "

@@ -11,14 +11,12 @@ import numpy as np
 
 from chuteflow import Chute
 from chuteflow.paper import style
-from chuteflow.paper.branches import in_order, runs
+from chuteflow.paper.branches import NUMBERS, in_order, runs, smooth
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.sources import Source, SteadyBranch, SteadyCurve, reach
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,23 +70,15 @@ def draw_densities(ax: Axes, found: SteadyCurve, **settings: Any) -> None:
     for branch in found.branches:
         for run in runs(branch):
             stroke = style.Stroke(style.BLACK, style.OF_DENSITY[run.density])
-            ax.plot(
-                [flow.mass_flux for flow in run.flows],
-                [flow.centre_of_mass for flow in run.flows],
-                **stroke.line() | settings,
-            )
+            line = smooth(run.flows)
+            ax.plot(line["mass_flux"], line["centre_of_mass"], **stroke.line() | settings)
 
 
 def draw_plain(ax: Axes, found: SteadyCurve, stroke: style.Stroke, name: str | None = None) -> None:
     """Centre of mass against mass flux in one stroke."""
     for i, branch in enumerate(found.branches):
-        points = [point.flow for point in in_order(branch)]
-        ax.plot(
-            [flow.mass_flux for flow in points],
-            [flow.centre_of_mass for flow in points],
-            label=name if i == 0 else None,
-            **stroke.line(),
-        )
+        line = smooth([point.flow for point in in_order(branch)])
+        ax.plot(line["mass_flux"], line["centre_of_mass"], label=name if i == 0 else None, **stroke.line())
 
 
 def hot_end(branch: SteadyBranch, centre_of_mass: float) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.paper import style
-from chuteflow.paper.branches import in_order
+from chuteflow.paper.branches import NUMBERS, in_order
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import (
@@ -34,7 +34,6 @@ PANELS = (
     ("mass_flux", "mass_holdup", 6.0, 1.6, ("below", "above left", "above")),
     ("mass_holdup", "centre_of_mass", 1.6, 15.0, ("right", "above right", "above right")),
 )
-NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Profile
+from chuteflow import QUANTITIES, Profile
 from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note
 from chuteflow.paper.materials import productive
@@ -74,5 +74,5 @@ def draw(data: Figure5) -> Figure:
     small.plot([1.0], [data.height_of_largest], marker="o", markersize=3.0, color=style.BLACK)
     small.set(xlim=(-1.5, 1.5), ylim=(0.0, TOP), xticks=[0.0, 1.0], yticks=[0.0, TOP])
     small.set_xticklabels(["0", f"{1e4 * excess:.1f}"])
-    style.name_axes(small, r"$10^4\,(T - T_\infty)$", None)
+    style.name_axes(small, rf"$10^4\,(T - {QUANTITIES['surface_temperature'].latex})$", None)
     return figure

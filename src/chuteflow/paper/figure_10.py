@@ -38,5 +38,7 @@ def draw(data: Curves) -> Figure:
     style.write(ax, LINE_Q[0], LINE_END * LINE_Q[0] ** 2, r"$h \sim Q^2$", xytext=(-4.0, 0.0), ha="right")
     style.write(ax, min(places), WINDOW_H[1], r"slope $\tan\theta$", xytext=(-8.0, 8.0), ha="right")
     style.name_axes(ax, style.label("mass_flux"), style.label("centre_of_mass"))
-    ax.set(xscale="log", yscale="log", xlim=WINDOW_Q, ylim=WINDOW_H)
+    style.logarithmic(ax, "x")
+    style.logarithmic(ax, "y")
+    ax.set(xlim=WINDOW_Q, ylim=WINDOW_H)
     return figure

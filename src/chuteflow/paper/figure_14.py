@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow import Chute, hot
+from chuteflow import QUANTITIES, Chute, hot
 from chuteflow.analysis.domains import exists_at
 from chuteflow.paper import style
 from chuteflow.paper.data import Table
@@ -142,5 +142,5 @@ def _points(ax: Axes, found: Domain) -> None:
             markerfacecolor=style.GREY if index == 0 else "none",
             markeredgecolor=style.GREY,
             markeredgewidth=0.6,
-            label=rf"flow at $T_\infty = {temperature:g}$",
+            label=rf"flow at ${QUANTITIES['surface_temperature'].latex} = {temperature:g}$",
         )

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from chuteflow.paper import style
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -73,6 +75,7 @@ def computed(number: int, source: Source) -> FigureData:
     return module.compute() if number in WITHOUT_METHOD else module.compute(source)
 
 
+@style.own_settings()
 def drawn(number: int, data: FigureData) -> Figure:
     """The picture of ``data``, with a line above it where a method does not reach all flows."""
     from chuteflow.paper import style

@@ -7,11 +7,11 @@ mapped method begins each family from a flow of the other, solves it anew, and f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from chuteflow import Branch, Chute, Curve, Flow, SolveError, curve, flows
+from chuteflow.processes import worker_pool
 from chuteflow.steady.collocation import LOG_Q, LOG_T
 from chuteflow.steady.mapped import LARGEST_DEGREE, MappedSolution, refine
 from chuteflow.steady.mapped_curve import CONTROL, TOLERANCE, MappedCurve, mapped_curve
@@ -172,21 +172,8 @@ def mapped_families(chute: Chute, surface_temperature: tuple[float, float]) -> M
 
 def _shared_out(workers: int, chutes: Sequence[Chute], ranges: Sequence[tuple[float, float]]) -> Sequence[MappedCurves]:
     """:func:`mapped_families` in processes of their own."""
-    import multiprocessing
-
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(chutes)), mp_context=context, initializer=_die_quietly)
-    try:
+    with worker_pool(min(workers, len(chutes))) as pool:
         return list(pool.map(mapped_families, chutes, ranges))
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _die_quietly() -> None:
-    """An interrupt from the terminal ends a worker without a traceback: the command says that it was interrupted."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 #: How notes begin on flows that a method does not reach.

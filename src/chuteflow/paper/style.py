@@ -1,13 +1,17 @@
 """The look of all figures: strokes that differ in print and for the colour-blind, panels and labels.
 
-matplotlib is imported when a figure is made, through its objects alone: nothing global is set.
+matplotlib is imported when a figure is made, through its objects alone. Figures have the settings of this module
+and matplotlib's defaults: neither a user's matplotlibrc nor a backend for windows or notebooks has a say.
 """
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +68,35 @@ STROKES = (
     Stroke(BLACK, SOLID),
     Stroke(GREY, DASHED),
 )
+
+
+@contextmanager
+def own_settings() -> Iterator[None]:
+    """matplotlib's defaults while a figure is made or written, whatever the settings are before and after.
+
+    It decorates functions too. Settings may ask for programs that are not there, such as LaTeX.
+    """
+    _import_matplotlib()
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams["svg.hashsalt"] = "chuteflow"  # the same names inside, whenever a picture is drawn
+        yield
+
+
+def _import_matplotlib() -> None:
+    """Import matplotlib where the environment names a backend that is not there, which would be an error."""
+    backend = os.environ.get("MPLBACKEND")
+    if "matplotlib" in sys.modules or backend is None:
+        return
+    os.environ["MPLBACKEND"] = "agg"
+    try:
+        import matplotlib
+    finally:
+        os.environ["MPLBACKEND"] = backend
+    with suppress(ValueError):
+        matplotlib.rcParams["backend"] = backend
 
 
 def stroke(index: int) -> Stroke:
@@ -158,7 +191,33 @@ def spread_scale(ax: Axes, axis: str, values: Sequence[Any]) -> None:
     """A logarithmic ``axis`` ("x" or "y") where positive values span more than a decade and a half."""
     flat = [value for part in values for value in np.ravel(part)]
     if flat and min(flat) > 0.0 and max(flat) > 30.0 * min(flat):
-        ax.set(**{f"{axis}scale": "log"})
+        logarithmic(ax, axis)
+
+
+def logarithmic(ax: Axes, axis: str) -> None:
+    """A logarithmic ``axis`` ("x" or "y"), whose numbers are text in the typeface of all others."""
+    from matplotlib.ticker import LogFormatter
+
+    class Powers(LogFormatter):
+        """Labels where matplotlib puts them: as plain numbers, or as powers of ten where some are large or small."""
+
+        def __call__(self, x: float, pos: Any = None) -> str:
+            if not super().__call__(x, pos):
+                return ""
+            low, high = self.axis.get_view_interval()  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
+            return f"{x:g}" if min(low, high) >= 5e-4 and max(low, high) <= 2e4 else power_of_ten(x)
+
+    ax.set(**{f"{axis}scale": "log"})
+    scaled = getattr(ax, f"{axis}axis")
+    scaled.set_major_formatter(Powers())
+    scaled.set_minor_formatter(Powers(labelOnlyBase=False))
+
+
+def power_of_ten(value: float) -> str:
+    """A positive number of one digit with its power raised, in the typeface of the text around it."""
+    digit, _, exponent = f"{value:.0e}".partition("e")
+    times = "" if digit == "1" else f"{digit}×"
+    return rf"$\mathdefault{{{times}10^{{{int(exponent)}}}}}$"
 
 
 def sentence(text: str) -> Figure:
@@ -189,4 +248,5 @@ def _calm(ax: Axes) -> None:
     for side in ("left", "bottom"):
         ax.spines[side].set_linewidth(0.6)
     ax.tick_params(labelsize=_SIZE - 1.0, width=0.6, length=3.0, labelfontfamily=_SERIF)
+    ax.tick_params(which="minor", labelsize=_SIZE - 2.5, width=0.5, length=2.0, labelfontfamily=_SERIF)
     ax.margins(x=0.03, y=0.03)

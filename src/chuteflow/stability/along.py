@@ -8,11 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.analysis.chords import Chord
 from chuteflow.analysis.results import Branch, Curve, SpecialPoint
-from chuteflow.errors import InputError, SolveError
+from chuteflow.checks import whole
+from chuteflow.errors import SolveError
 from chuteflow.stability.verdict import Stability, stability_of
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
@@ -31,6 +34,9 @@ class Sample:
     flow: Flow
     found: Stability | None
 
+    def __repr__(self) -> str:
+        return display.line("Sample", self.label, repr(self.flow)[1:-1])
+
     @property
     def label(self) -> str:
         """ "stable", the direction of the mode that grows fastest, or "unknown"."""
@@ -48,6 +54,9 @@ class Run:
     label: str
     flows: tuple[Flow, ...]
 
+    def __repr__(self) -> str:
+        return display.line("Run", self.label, display.counted(len(self.flows), "flow"))
+
 
 @dataclass(frozen=True, eq=False)
 class MarkedBranch:
@@ -60,6 +69,10 @@ class MarkedBranch:
     samples: tuple[Sample, ...]
     runs: tuple[Run, ...]
 
+    def __repr__(self) -> str:
+        labels = ", ".join(run.label for run in self.runs)
+        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} judged: {labels}")
+
 
 @dataclass(frozen=True, eq=False)
 class MarkedCurve:
@@ -68,7 +81,13 @@ class MarkedCurve:
     curve: Curve
     branches: tuple[MarkedBranch, ...]
 
+    def __repr__(self) -> str:
+        judged = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
 
+
+@on_one_thread
+@np.errstate(under="ignore")
 def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 
@@ -81,8 +100,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
     """
-    if not 2 <= samples <= _MOST_SAMPLES:
-        raise InputError(f"samples = {samples}: must be from 2 to {_MOST_SAMPLES}")
+    samples = whole("samples", samples, 2, _MOST_SAMPLES)
     found = []
     for i, branch in enumerate(curve.branches):
 

@@ -20,7 +20,6 @@ from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.stability.base import Base, Resolution, shares
 from chuteflow.steady.flow import Flow
-from chuteflow.theory.laws import law
 
 #: Points of the curve for each node of a grid.
 _FINENESS = 6
@@ -37,7 +36,7 @@ def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
     """u and -Re sigma_c where ``share`` of the mass lies above."""
     profile = flow.at_overburden(share)
     nu, T = profile.volume_fraction, profile.granular_temperature
-    chute, chosen = flow.chute, law(flow.chute.closure)
+    chute, chosen = flow.chute, flow.law
     g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
     warming = g.density_conductivity / g.conductivity
     # dp/dnu where no heat flows

@@ -34,8 +34,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients
-from chuteflow.theory.laws import law
+from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
 from chuteflow.theory.transport import Grains, Vector, traction
 
 #: Degree of the grid in m.
@@ -45,6 +44,8 @@ FIELDS = 4
 _SMALLEST = 1e-250
 #: Imaginary step of derivatives, far below rounding.
 _STEP = 1e-40
+#: Densities far above the base fall off to zero.
+_vanishing = np.errstate(under="ignore")
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,7 @@ class Layer:
     """
 
     chute: Chute
+    law: Law
     mass_holdup: float
     stretch: float
     degree: int = DEGREE
@@ -119,9 +121,9 @@ class Layer:
             raise InputError(
                 "the interface is known for steady flows alone: time needs the free surface, give --surface free"
             )
-        Grains(law(flow.chute.closure), flow.chute.restitution, flow.chute.slope)
+        Grains(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
-        return cls(flow.chute, flow.mass_holdup, stretch, degree)
+        return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
 
     @property
     def _grid(self) -> LobattoGrid:
@@ -142,6 +144,7 @@ class Layer:
         rate = stretch_map(self._grid.nodes, self.stretch)[1]
         return self._grid.derivative / (self.mass_holdup * rate)[:, None]
 
+    @_vanishing
     def steady(self, flow: Flow) -> Array:
         """The state that ``flow``, of the same hold-up, is."""
         profile = flow.at_overburden(np.maximum(self.mass / self.mass_holdup, _SMALLEST))
@@ -149,6 +152,7 @@ class Layer:
         tau = T * self._coefficients(nu).compressibility
         return np.concatenate([np.log(tau), profile.velocity, np.zeros_like(nu), np.log(T)])
 
+    @_vanishing
     def rate(self, state: Array) -> Array:
         """d state/dt; ``state`` may be many (..., 4 (degree + 1))."""
         log_tau, _, _, log_T = self._fields(state)
@@ -164,6 +168,7 @@ class Layer:
         fields[..., 3, :] = heating / (1.5 * np.exp(log_T))
         return fields.reshape(state.shape)
 
+    @_vanishing
     def jacobian(self, state: Array) -> Array:
         """d rate/d state, exact (complex steps)."""
         stepped: Any = state + _STEP * 1j * np.eye(len(state))
@@ -179,10 +184,12 @@ class Layer:
         values = np.linalg.eigvals(self.jacobian(state)[np.ix_(moving, moving)]).astype(complex)
         return values[np.argsort(-np.real(values))]
 
+    @_vanishing
     def base_density(self, state: Array) -> float:
         """nu at the base over that of the densest packing."""
-        return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / law(self.chute.closure).densest)
+        return float(self.mass_holdup * np.exp(-self._fields(state)[0][-1]) / self.law.densest)
 
+    @_vanishing
     def numbers(self, state: Array) -> tuple[float, float, float, float]:
         """Q, h, and T at the surface and at the base."""
         log_tau, u, _, log_T = self._fields(state)
@@ -238,9 +245,8 @@ class Layer:
         )
 
     def _coefficients(self, nu: Array) -> Coefficients:
-        chosen = law(self.chute.closure)
-        room = 1.0 - nu / chosen.densest
-        return chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope)
+        room = 1.0 - nu / self.law.densest
+        return self.law.coefficients(nu, room, self.chute.restitution, self.chute.slope)
 
     def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:
         """P_xz and q at the base, and the energy lost to it, (2.9)-(2.15)."""

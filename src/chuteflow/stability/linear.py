@@ -35,7 +35,6 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import Base
-from chuteflow.theory.laws import law
 from chuteflow.theory.transport import Fields, Grains, Motion, Vector, base_conditions, motion
 
 #: Order of the unknowns n, u, v, w, tau, each at all nodes from the top to the base, with omega for the first n.
@@ -117,7 +116,7 @@ def grains(base: Base) -> Grains:
             f"stability with the surface {chute.surface!r}: its conditions are known for a steady, level interface "
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
-    return Grains(law(chute.closure), chute.restitution, chute.slope)
+    return Grains(base.flow.law, chute.restitution, chute.slope)
 
 
 def operator(base: Base) -> Operator:
@@ -200,7 +199,7 @@ def _viscosity(base: Base, at_rest: Motion) -> float:
 
 def _conductivity(base: Base) -> float:
     """K at the top."""
-    chute = base.flow.chute
+    chute, law = base.flow.chute, base.flow.law
     nu = base.profile.volume_fraction[:1]
-    g = law(chute.closure).coefficients(nu, 1.0 - nu / law(chute.closure).densest, chute.restitution, chute.slope)
+    g = law.coefficients(nu, 1.0 - nu / law.densest, chute.restitution, chute.slope)
     return float(g.conductivity[0] * np.sqrt(base.profile.granular_temperature[0]))

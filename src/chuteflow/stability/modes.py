@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
@@ -60,6 +61,10 @@ class Mode:
     error: float
     operator: Operator
     vector: Complex
+
+    def __repr__(self) -> str:
+        numbers = {"kx": self.kx, "ky": self.ky, "growth": self.growth, "frequency": self.frequency}
+        return display.line("Mode", self.kind, **numbers, error=self.error)
 
     @property
     def growth(self) -> float:

@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 from contourpy import contour_generator
 
+from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control, Point, closes, trace
 from chuteflow.numerics.eigenproblem import Complex, refined
@@ -80,6 +81,9 @@ class NeutralCurve:
     frequency: Array
     error: Array
     ends: tuple[str, str]
+
+    def __repr__(self) -> str:
+        return display.line("NeutralCurve", display.counted(len(self.z), "point"), f"begins at {self.ends[0]}")
 
 
 def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list[NeutralCurve]:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from chuteflow import display
+from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.along import flow_between
@@ -19,6 +21,7 @@ from chuteflow.stability.modes import Disturbances, check_wavenumbers
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
 from chuteflow.stability.verdict import leading, stability_of
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Called with the share of a scan that is done.
 Progress = Callable[[float], None]
@@ -127,6 +130,10 @@ class WaveMap:
     frequency: Array
     neutral: tuple[NeutralCurve, ...]
 
+    def __repr__(self) -> str:
+        reach = (display.span("kx", self.kx), display.span("ky", self.ky), display.span("growth", self.growth.flat))
+        return display.line("WaveMap", *reach, display.counted(len(self.neutral), "neutral curve"))
+
 
 @dataclass(frozen=True, eq=False)
 class FamilyMap:
@@ -145,7 +152,14 @@ class FamilyMap:
     neutral: tuple[NeutralCurve, ...]
     neutral_flows: tuple[tuple[Flow, ...], ...]
 
+    def __repr__(self) -> str:
+        reach = (display.span("k h", self.depth_wavenumber), display.span("growth", self.growth.flat))
+        flows, curves = display.counted(len(self.flows), "flow"), display.counted(len(self.neutral), "neutral curve")
+        return display.line("FamilyMap", f"{flows}, waves at {self.angle:g} degrees", *reach, curves)
 
+
+@on_one_thread
+@np.errstate(under="ignore")
 def wave_map(
     flow: Flow,
     *,
@@ -188,6 +202,8 @@ def wave_map(
     )
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def family_map(
     flows: Sequence[Flow],
     *,
@@ -212,8 +228,10 @@ def family_map(
     _check_size(size)
     if len(flows) < 2:
         raise InputError(f"{len(flows)} flow: a family needs at least 2")
+    angle = number("angle", angle)
     if not 0.0 <= angle <= 90.0:
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
+    depth_wavenumber = pair("depth_wavenumber", depth_wavenumber)
     if not 0.0 < depth_wavenumber[0] < depth_wavenumber[1] <= _LARGEST_DEPTH_WAVENUMBER:
         low, high = depth_wavenumber
         raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
@@ -246,8 +264,7 @@ def _usual(flow: Flow) -> float:
 
 
 def _check_size(size: tuple[int, int]) -> None:
-    if not all(4 <= points <= _MOST_POINTS for points in size):
-        raise InputError(f"size {size[0]}x{size[1]}: must be from 4x4 to {_MOST_POINTS}x{_MOST_POINTS}")
+    checked_size(size, 4, _MOST_POINTS)
 
 
 def _check_range(name: str, ends: tuple[float, float]) -> None:

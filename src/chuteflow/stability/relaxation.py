@@ -9,10 +9,12 @@ import numpy as np
 from scipy.integrate import Radau
 
 from chuteflow.analysis.enumeration import flows
+from chuteflow.checks import number
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.stability.layer import FIELDS, Layer
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Relative error of a step in time.
 TOLERANCE = 1e-7
@@ -73,11 +75,12 @@ def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERA
         rtol=tolerance,
         atol=1e-2 * tolerance,
     )
+    step = on_one_thread(stepper.step)
     first = last = Moment(0.0, *layer.numbers(state), state)
     yield first
     while stepper.status == "running" and not _at_rest(layer, first, last):
         with np.errstate(all="ignore"):
-            stepper.step()
+            step()
         if stepper.status == "failed" or not np.isfinite(stepper.y).all():
             raise SolveError(f"the flow cannot be followed beyond t = {stepper.t:.6g}: disturb it less")
         last = Moment(float(stepper.t), *layer.numbers(stepper.y), stepper.y.copy())
@@ -88,6 +91,8 @@ def _at_rest(layer: Layer, first: Moment, last: Moment) -> bool:
     return last.base_temperature < _COLD * first.base_temperature and layer.base_density(last.state) > _PACKED
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def outcome(layer: Layer, moments: Sequence[Moment]) -> Outcome:
     """Which steady flow the last of ``moments`` is nearest to, and whether it approaches."""
     steady = tuple(flows(layer.chute, M=layer.mass_holdup))
@@ -115,6 +120,7 @@ def disturbed(state: Array, temperature: float = 1.0, velocity: float = 1.0) -> 
     Raises:
         InputError: for factors that are not positive, or above 1000.
     """
+    temperature, velocity = number("temperature", temperature), number("velocity", velocity)
     for name, factor in (("temperature", temperature), ("velocity", velocity)):
         if not 0.0 < factor <= 1000.0:
             raise InputError(f"{name} times {factor:g}: the factor must be above 0 and at most 1000")

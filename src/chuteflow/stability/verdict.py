@@ -14,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import refined
 from chuteflow.stability.modes import DEGREES, TOLERANCE, Disturbances, Mode, check_wavenumbers
 from chuteflow.steady.flow import Flow
+from chuteflow.threads import on_one_thread
 
 #: Range of k h that is searched; the shortest waves are two grains long, or as long as the flow is deep.
 RANGE, _SHORTEST = (1e-3, 10.0), np.pi
@@ -51,7 +53,21 @@ class Stability:
     searched: tuple[float, float]
     smallest_rate: float
 
+    def __repr__(self) -> str:
+        verdict = {True: "stable", False: "unstable"}.get(self.stable, "not known")
+        return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
 
+    def _repr_html_(self) -> str:
+        mode = self.mode
+        header = ["", "mode", "kx", "ky", "growth", "frequency", "error"]
+        numbers = [] if mode is None else [mode.kx, mode.ky, mode.growth, mode.frequency, mode.error]
+        cells = ["none"] if mode is None else [mode.kind, *map(display.number, numbers)]
+        verdict = repr(self)[1:-1].split(": ")[1].split("; ")[0]
+        return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
+
+
+@on_one_thread
+@np.errstate(under="ignore")
 def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None) -> Stability:
     """Whether ``flow`` is stable, from a search over wavenumbers.
 
@@ -85,6 +101,8 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
     return RANGE[0] / h, min(RANGE[1], max(_SHORTEST * h, 1.0)) / h
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
     """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
 
@@ -290,6 +308,8 @@ class GrowthMap:
     error: Array
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def growth_map(disturbances: Disturbances, kx: Array, ky: Array) -> GrowthMap:
     """The leading mode at each pair of wavenumbers, about 40 ms for each.
 

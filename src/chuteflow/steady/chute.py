@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.constitutive import require_positive
@@ -40,7 +41,7 @@ class Chute:
 
     def __post_init__(self) -> None:
         for name in ("slope", "restitution", "wall_restitution", "roughness"):
-            object.__setattr__(self, name, _number(name, getattr(self, name)))
+            object.__setattr__(self, name, number(name, getattr(self, name)))
         if not 1e-8 <= self.slope <= 1e4:
             raise InputError(f"slope = {self.slope}: tan(theta) must be positive (from 1e-8 to 1e4)")
         if not 1e-8 <= self.restitution <= 1.0:
@@ -66,7 +67,7 @@ class Chute:
         Raises:
             InputError: for an angle out of range.
         """
-        angle = _number("angle", degrees)
+        angle = number("angle", degrees)
         if not 0.0 < angle < 90.0:
             raise InputError(f"angle = {angle} degrees: must be above 0 and below 90")
         return cls(slope=math.tan(math.radians(angle)), **others)
@@ -79,13 +80,3 @@ class Chute:
     def as_dict(self) -> dict[str, float | str]:
         """All parameters by name."""
         return asdict(self)
-
-
-def _number(name: str, value: object) -> float:
-    try:
-        number = float(value)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {value!r}: must be a number") from None
-    if not math.isfinite(number):
-        raise InputError(f"{name} = {number}: must be a finite number")
-    return number

@@ -9,17 +9,30 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chuteflow import display
+from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix, refinement
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation, State, stretch_map, stretch_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+from chuteflow.steady.names import name_of
+from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution, in_parts
+from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
+from chuteflow.theory.constitutive import Law
+from chuteflow.theory.laws import law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
 #: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
 _SAMPLES = 96
+#: The density is taken to rise or fall where p dtheta/dp differs by so much from 1.
+_LEVEL = 1e-8
+#: Heights of a profile at most.
+_MOST_POINTS = 1_000_000
+#: Far above the base, what falls off exponentially becomes zero.
+_vanishing = np.errstate(under="ignore")
 #: Share P/M of the overburden above the highest point that is told from the far field.
 _SMALLEST_SHARE = 1e-260
 
@@ -44,6 +57,15 @@ class Profile:
     shear_rate: Array
     production: Array
     dissipation: Array
+
+    def __repr__(self) -> str:
+        heights = np.ravel(self.height)
+        return display.line("Profile", display.counted(heights.size, "height"), display.span("z", heights))
+
+    def _repr_html_(self) -> str:
+        columns = [np.ravel(getattr(self, name)) for name in FIELDS]
+        rows = [[display.number(value) for value in row] for row in zip(*columns, strict=True)]
+        return display.html_table("Fields over height", [FIELDS[name].symbol for name in FIELDS], rows)
 
 
 @dataclass(frozen=True)
@@ -80,6 +102,21 @@ class Flow:
     chute: Chute
     solution: Solution
 
+    def __repr__(self) -> str:
+        numbers = {NUMBERS[name].symbol: getattr(self, name) for name in PLACE}
+        return display.line("Flow", self.name, **numbers, error=self.error)
+
+    def _repr_html_(self) -> str:
+        rows = [(q.symbol, display.number(getattr(self, name)), q.description) for name, q in NUMBERS.items()]
+        rows.append(("error", display.number(self.error), "estimated relative error of Q, h and M, the largest"))
+        kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
+        return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
+
+    @property
+    def name(self) -> str:
+        """What it is called by its own numbers, such as "hot, dilute, deep", see :mod:`chuteflow.steady.names`."""
+        return name_of(self.surface_temperature, self.largest_volume_fraction, self.centre_of_mass)
+
     @property
     def mass_flux(self) -> float:
         """Q, (3.26)."""
@@ -99,6 +136,11 @@ class Flow:
     def surface_temperature(self) -> float:
         """T far above (half-line) or at the interface."""
         return self._macroscopic(LOG_T)
+
+    @property
+    def law(self) -> Law:
+        """The constitutive law that it was solved with, whatever is registered under its name now."""
+        return self._model.law
 
     @property
     def error(self) -> float:
@@ -175,6 +217,31 @@ class Flow:
         return float(net.min()), float(net.max())
 
     @cached_property
+    def validity(self) -> Validity:
+        """How far the flow keeps to what the theory takes for granted."""
+        problem, state = self.solution.problem, self._state
+        chosen = law(self.chute.closure)
+        nu = _density(state.x, state.f)
+        # Rounding does not let grains be packed to the last.
+        room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
+        contacts = nu * chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope).radial
+        per_grain = problem.grid.weights / state.s_p / state.mass
+        largest = self.largest_volume_fraction
+        return Validity(
+            largest_volume_fraction=largest,
+            packing=largest / chosen.densest,
+            slip_ratio=float(self._model.slip(state.f[:, -1])),
+            knudsen_number=MEAN_FREE_PATH / float(per_grain @ contacts) / self.centre_of_mass,
+            density_turns=self._density_turns,
+        )
+
+    @property
+    def _density_turns(self) -> int:
+        rise = self._samples["rise"] - 1.0
+        signs = np.sign(rise[np.abs(rise) > _LEVEL])
+        return int(np.count_nonzero(np.diff(signs)))
+
+    @cached_property
     def energy_budget(self) -> EnergyBudget:
         """Where fluctuation energy comes from and goes to, in the whole flow."""
         problem, state, model = self.solution.problem, self._state, self._model
@@ -195,7 +262,7 @@ class Flow:
         Raises:
             InputError: for a height below the base or above the interface.
         """
-        z = np.asarray(z, dtype=float)
+        z = real_array("z", z)
         flat = z.ravel()
         highest = self.interface_height
         if flat.size and not (np.isfinite(flat).all() and flat.min() >= 0.0 and flat.max() <= highest * (1 + 1e-12)):
@@ -209,14 +276,15 @@ class Flow:
         Raises:
             InputError: for a share out of range.
         """
-        share = np.asarray(share, dtype=float)
+        share = real_array("share", share)
         if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
             raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
         return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
         """All fields at ``points`` heights, spaced evenly from the base to ``top``, by default the depth."""
-        return self.profile(np.linspace(0.0, self.depth if top is None else top, points))
+        points = whole("points", points, 1, _MOST_POINTS)
+        return self.profile(np.linspace(0.0, self.depth if top is None else number("top", top), points))
 
     @property
     def _model(self) -> Model:
@@ -229,6 +297,7 @@ class Flow:
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
@@ -270,13 +339,20 @@ class Flow:
         if k in (0, len(nu) - 1):
             return share[k : k + 1]
         low, high = share[k - 1], share[k + 1]
+        below, above = (float(self._samples["rise"][i] - 1.0) for i in (k - 1, k + 1))
+        middle = share[k]
+        # Secants within the bracket; an end that stays counts for half (the Illinois method).
         for _ in range(50):
-            middle = 0.5 * (low + high)
-            if self._at_share(np.array([middle]))[0]["rise"][0] < 1.0:
-                low = middle
+            value = float(self._at_share(np.array([middle]))[0]["rise"][0] - 1.0)
+            if value < 0.0:
+                low, below, above = middle, value, 0.5 * above
             else:
-                high = middle
-        return np.array([0.5 * (low + high)])
+                high, below, above = middle, 0.5 * below, value
+            # The density is flat there: half the digits of the place are all of its own.
+            if abs(value) < _LEVEL or not below < 0.0 < above:
+                break
+            middle = low - below * (high - low) / (above - below)
+        return np.array([middle])
 
     @cached_property
     def _antiderivatives(self) -> tuple[Array, Array]:
@@ -303,6 +379,7 @@ class Flow:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
+    @_vanishing
     def _shares_at(self, z: Array) -> Array:
         """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
@@ -321,6 +398,7 @@ class Flow:
                 break
         return np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
 
+    @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         at, f = self._at_share(share)
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
@@ -355,6 +433,7 @@ def flows_of(chute: Chute, solutions: Sequence[Solution]) -> list[Flow]:
     return flows
 
 
+@_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem

@@ -45,6 +45,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
+from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.newton import newton
@@ -516,7 +517,7 @@ class MappedSolution:
         Raises:
             InputError: for a height below the base or above the interface.
         """
-        z = np.asarray(z, dtype=float)
+        z = real_array("z", z)
         highest = self.interface_height * (1.0 + 1e-12)
         if z.size and not (np.isfinite(z).all() and z.min() >= 0.0 and z.max() <= highest):
             raise InputError(f"heights must be from 0 (base) to {highest}: got {z.min()} to {z.max()}")
@@ -611,7 +612,7 @@ def refine(
     Raises:
         InputError: for a tolerance, degree or multiple out of range, or a start with another surface.
     """
-    checked_tolerance(tolerance)
+    tolerance = checked_tolerance(tolerance)
     system, z = _placed(chute, start, largest_degree, multiple)
     a, b, _, _ = system.split(z)
     degree = min(max(8, _length(a, 0.03 * tolerance), _length(b, 0.03 * tolerance)), largest_degree)

@@ -23,7 +23,7 @@ import numpy as np
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import Law, reduce
+from chuteflow.theory.constitutive import Law, reduce, require_positive
 from chuteflow.theory.laws import law
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
@@ -53,14 +53,14 @@ def _argument(c: Array) -> Array:
     return _OFFSET * np.expm1(np.expm1(c))
 
 
-def closure_table(closure: str, e: float, slope: float) -> Table:
+def closure_table(closure: Law, e: float, slope: float) -> Table:
     """The eight functions of x for ``closure``."""
-    return _closure_table(closure, e, slope if law(closure).knows_slope else 0.0)
+    return _closure_table(closure, e, slope if closure.knows_slope else 0.0)
 
 
+# Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
-def _closure_table(closure: str, e: float, slope: float) -> Table:
-    chosen = law(closure)
+def _closure_table(chosen: Law, e: float, slope: float) -> Table:
     density = _density_table(chosen, e, slope)
 
     def functions(c: Array) -> Array:
@@ -75,6 +75,13 @@ def _closure_table(closure: str, e: float, slope: float) -> Table:
         return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
 
     return tabulate(functions, 0.0, _UPPER, _PIECES, _DEGREE)
+
+
+def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
+    """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
+    inner = np.log1p(x * (1.0 / _OFFSET))
+    values, slopes = table(np.log1p(inner))
+    return values, slopes * (x / ((x + _OFFSET) * (1.0 + inner)))
 
 
 def _density_table(chosen: Law, e: float, slope: float) -> Table:
@@ -117,9 +124,11 @@ class Model:
     """The steady problem of one chute: closures and boundary data, ready to evaluate.
 
     ``slope`` and ``roughness`` are those of the chute, but where one is moved along by :func:`model_along`.
+    ``law`` is the one that was registered under the name of the chute's closure when the model was made.
     """
 
     chute: Chute
+    law: Law
     slope: float
     roughness: float
     table: Table
@@ -130,9 +139,7 @@ class Model:
 
     def closures(self, x: Array) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
-        inner = np.log1p(x * (1.0 / _OFFSET))
-        values, slopes = self.table(np.log1p(inner))
-        return values, slopes * (x / ((x + _OFFSET) * (1.0 + inner)))
+        return evaluate_closures(self.table, x)
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
@@ -147,10 +154,20 @@ class Model:
         return self.slope * self.slip(closures) - self.base_loss
 
 
-@lru_cache(maxsize=256)
 def model(chute: Chute) -> Model:
-    """The continuous problem of ``chute``."""
-    return _model(chute, _parameters(chute), closure_table(chute.closure, chute.restitution, chute.slope))
+    """The continuous problem of ``chute``, with the law that is registered now.
+
+    Raises:
+        InputError: where that law has no meaning for the chute.
+    """
+    return _registered(chute, law(chute.closure))
+
+
+@lru_cache(maxsize=256)
+def _registered(chute: Chute, chosen: Law) -> Model:
+    # The chute may be older than the law.
+    require_positive(chosen, chute.restitution, chute.slope)
+    return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope))
 
 
 def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
@@ -162,19 +179,21 @@ def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Mode
     """
     at = _parameters(chute) | {parameter: value}
     beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
-    stepped = closure_table(chute.closure, beyond["restitution"], beyond["slope"])
+    chosen = law(chute.closure)
+    stepped = closure_table(chosen, beyond["restitution"], beyond["slope"])
     table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
-    return _model(chute, at, table), _model(chute, beyond, stepped)
+    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, stepped)
 
 
 def _parameters(chute: Chute) -> dict[str, Any]:
     return {name: getattr(chute, name) for name in PARAMETERS}
 
 
-def _model(chute: Chute, parameters: dict[str, Any], table: Table) -> Model:
+def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) -> Model:
     slope, roughness = parameters["slope"], parameters["roughness"]
     return Model(
         chute=chute,
+        law=chosen,
         slope=slope,
         roughness=roughness,
         table=table,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from chuteflow.checks import number
 from chuteflow.errors import InputError
 
 
@@ -87,7 +88,7 @@ NUMBERS: dict[str, Quantity] = {
         Quantity(
             "surface_temperature",
             "T_surface",
-            r"T_\infty",
+            r"T_{\mathrm{surface}}",
             (0, 1, 1),
             "m^2/s^2",
             "section 3.2",
@@ -142,6 +143,52 @@ NUMBERS: dict[str, Quantity] = {
     )
 }
 
+#: The numbers that place a flow on a curve.
+PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
+
+#: Numbers that tell how far a flow keeps to the theory, attributes of :class:`chuteflow.steady.validity.Validity`.
+VALIDITY: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        Quantity(
+            "packing",
+            "packing",
+            r"\nu_{\max}/\nu^*",
+            (0, 0, 0),
+            "1",
+            "section 2.1",
+            "largest volume fraction over that of the densest packing of the law",
+        ),
+        Quantity(
+            "slip_ratio",
+            "slip_ratio",
+            r"u_0/\sqrt{T_0}",
+            (0, 0, 0),
+            "1",
+            "section 2.2",
+            "slip velocity over the velocity of fluctuations at the base",
+        ),
+        Quantity(
+            "knudsen_number",
+            "knudsen_number",
+            r"\mathrm{Kn}",
+            (0, 0, 0),
+            "1",
+            "",
+            "mean free path over the height of the centre of mass",
+        ),
+        Quantity(
+            "density_turns",
+            "density_turns",
+            "n",
+            (0, 0, 0),
+            "1",
+            "",
+            "how often the volume fraction turns between rising and falling with height",
+        ),
+    )
+}
+
 QUANTITIES: dict[str, Quantity] = FIELDS | NUMBERS
 
 
@@ -162,9 +209,10 @@ class Scales:
 
     def __post_init__(self) -> None:
         for name in ("diameter", "density", "gravity"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
+            value = number(name, getattr(self, name))
+            if value <= 0.0:
                 raise InputError(f"{name} = {value}: must be a positive number")
+            object.__setattr__(self, name, value)
 
     def factor(self, name: str, slope: float) -> float:
         """What the dimensionless quantity ``name`` on a chute of ``slope`` is multiplied with for SI units.

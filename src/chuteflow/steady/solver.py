@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from chuteflow.checks import real
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton, solve_each
@@ -87,14 +88,16 @@ class Solution:
         return self.problem.state(self.z)
 
 
-def checked_tolerance(tolerance: float) -> None:
-    """Check a relative tolerance.
+def checked_tolerance(tolerance: float) -> float:
+    """A relative tolerance as it was given, once it is sure that it can be asked for.
 
     Raises:
         InputError: if it is out of range.
     """
-    if not 1e-11 <= tolerance <= 1e-3:
-        raise InputError(f"tolerance {tolerance:g}: must be from 1e-11 to 1e-3")
+    asked = real("tolerance", tolerance)
+    if not 1e-11 <= asked <= 1e-3:
+        raise InputError(f"tolerance {asked:g}: must be from 1e-11 to 1e-3")
+    return asked
 
 
 def default_stretch(model: Model, mass: float, temperature: float) -> float:
@@ -108,6 +111,8 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
     return other, np.concatenate([z[..., :-2] @ matrix.T, z[..., -2:]], axis=-1)
 
 
+# A flow that runs away is told by what is not finite.
+@np.errstate(all="ignore")
 def solve(problem: Collocation, z: Array, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
     """The flow nearest to ``z`` that meets ``condition``.
 

@@ -4,26 +4,55 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+import os
+from array import array
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.sobol import Sobol
 
+#: Points of a study at most.
+MOST_POINTS = 1 << 40
 #: Points of a random design that share one stream of numbers.
 _BLOCK = 4096
+_LARGEST_SEED = (1 << 64) - 1
 _SCALES = ("linear", "log")
+#: Characters of a value that a message shows.
+_SHOWN = 60
+
+
+def shown(value: Any) -> str:
+    """A value of a study for a message, however long it is."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        # Integers of thousands of digits, and lists nested as deep, have no text.
+        text = f"a very long {type(value).__name__}"
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
+
+
+def shown_key(name: str) -> str:
+    """The name of a key for a message: as it is, or quoted where it is long or cannot be printed."""
+    return name if name.isprintable() and len(name) <= _SHOWN else shown(name)
+
+
+def shown_path(path: str | os.PathLike[str]) -> str:
+    """A path for a message: as it is, or quoted where it cannot be printed."""
+    return str(path) if str(path).isprintable() else shown(str(path))
 
 
 @dataclass(frozen=True, eq=False)
 class Axis:
     """One parameter: ``values`` (k,) as numbers, or where it is ``words`` their places among these; or a range from
-    ``low`` to ``high``, even in the parameter or, where it is ``log``, in its logarithm."""
+    ``low`` to ``high``, even in the parameter or, where it is ``log``, in its logarithm, of ``steps`` values where it
+    is divided."""
 
     name: str
     values: Array
@@ -32,6 +61,20 @@ class Axis:
     high: float = 0.0
     log: bool = False
     ranged: bool = False
+    steps: int = 0
+
+    @property
+    def count(self) -> int:
+        """How many values there are: 0 for a range that is not divided."""
+        return self.steps if self.ranged else len(self.values)
+
+    def nth(self, places: NDArray[np.intp]) -> Array:
+        """The values at ``places``, counted from 0."""
+        if not self.ranged:
+            return self.values[places]
+        # As numpy.linspace has it to the last bit, without the values that are not asked for.
+        share = np.where(places == self.steps - 1, 1.0, places * (1.0 / (self.steps - 1)))
+        return _between(self.low, self.high, share, self.log)
 
     @property
     def extremes(self) -> tuple[float, float]:
@@ -80,42 +123,48 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     key = f"parameters.{name}"
     if name in words:
         known = words[name][0]
-        names = value if isinstance(value, list) else [value]
+        names = _listed(value)
         for one in names:
             if one not in known:
-                raise InputError(f"{key}: unknown {name} {one!r}: choose one of {', '.join(known)}")
+                raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
         if not names:
             raise InputError(f"{key} = []: give at least one value")
         return Axis(name, np.array([known.index(one) for one in names], dtype=float), known)
     if isinstance(value, Mapping):
         return _range(name, key, value)
-    values = value if isinstance(value, list) else [value]
+    if isinstance(value, np.ndarray) and value.dtype == float and np.isfinite(value).all():
+        return Axis(name, value)
+    values = _listed(value)
     if not values:
         raise InputError(f"{key} = []: give at least one value")
     return Axis(name, np.array([_number(key, one) for one in values]))
 
 
+def _listed(value: Any) -> list[Any]:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value if isinstance(value, list) else [value]
+
+
 def _range(name: str, key: str, value: Mapping[str, Any]) -> Axis:
     for one in value:
         if one not in ("from", "to", "points", "scale"):
-            raise InputError(f"unknown key {key}.{one}: a range has from, to, points and scale")
+            raise InputError(f"unknown key {key}.{shown_key(one)}: a range has from, to, points and scale")
     for one in ("from", "to"):
         if one not in value:
             raise InputError(f"{key}.{one} is missing: a range has from and to")
     low, high = _number(f"{key}.from", value["from"]), _number(f"{key}.to", value["to"])
     scale = value.get("scale", "linear")
     if scale not in _SCALES:
-        raise InputError(f"{key}.scale = {scale!r}: choose one of {', '.join(_SCALES)}")
+        raise InputError(f"{key}.scale = {shown(scale)}: choose one of {', '.join(_SCALES)}")
     if not low < high:
         raise InputError(f"{key} from {low:g} to {high:g}: must rise")
     if scale == "log" and low <= 0.0:
         raise InputError(f"{key}.from = {low:g}: must be above 0 on the log scale")
     count = value.get("points", 0)
-    if isinstance(count, bool) or not isinstance(count, int) or (count != 0 and count < 2):
-        raise InputError(f"{key}.points = {count!r}: must be a whole number from 2")
-    log = scale == "log"
-    values = _between(low, high, np.linspace(0.0, 1.0, count), log) if count else np.empty(0)
-    return Axis(name, values, (), low, high, log, True)
+    if isinstance(count, bool) or not isinstance(count, int) or (count != 0 and not 2 <= count <= MOST_POINTS):
+        raise InputError(f"{key}.points = {shown(count)}: must be a whole number from 2 to {MOST_POINTS}")
+    return Axis(name, np.empty(0), (), low, high, scale == "log", True, count)
 
 
 def _between(low: float, high: float, share: Array, log: bool) -> Array:
@@ -136,20 +185,20 @@ def _product(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     """Every combination of the values; the last parameter of the table runs fastest."""
     del head
     for axis in axes.values():
-        if axis.ranged and not len(axis.values):
+        if not axis.count:
             raise InputError(f"parameters.{axis.name}.points is missing: a product needs the number of values")
-    shape = tuple(len(axis.values) for axis in axes.values())
+    shape = tuple(axis.count for axis in axes.values())
 
     def rows(first: int, last: int) -> dict[str, Array]:
         places = np.unravel_index(np.arange(first, last), shape)
-        return {name: axis.values[place] for (name, axis), place in zip(axes.items(), places, strict=True)}
+        return {name: axis.nth(place) for (name, axis), place in zip(axes.items(), places, strict=True)}
 
     return Design(math.prod(shape), axes, rows)
 
 
 def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     """Independent points, the same whatever the size of the pieces."""
-    points, seed = _whole(head, "points", 1, None), _whole(head, "seed", 0, 0)
+    points, seed = _points(head), _seed(head)
 
     def block(number: int) -> Array:
         return np.random.default_rng([seed, number]).random((_BLOCK, len(axes)))
@@ -165,7 +214,7 @@ def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
 
 def _sobol(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     """Sobol' points, scrambled: evenly spread, in pieces and as a whole."""
-    points, seed = _whole(head, "points", 1, None), _whole(head, "seed", 0, 0)
+    points, seed = _points(head), _seed(head)
     source = Sobol(len(axes), seed)
 
     def rows(first: int, last: int) -> dict[str, Array]:
@@ -211,11 +260,13 @@ def list_design(
     if "file" in head:
         for name, column in _csv(folder / str(head["file"]), words).items():
             if name in table:
-                raise InputError(f"parameters.{name} is given in the study and in {head['file']}: give it once")
+                raise InputError(
+                    f"parameters.{shown_key(name)} is given in the study and in {head['file']}: give it once"
+                )
             table[name] = column
     for name, value in table.items():
         if isinstance(value, Mapping):
-            raise InputError(f"parameters.{name}: a list design takes values, not a range")
+            raise InputError(f"parameters.{shown_key(name)}: a list design takes values, not a range")
     axes = {name: axis_from(name, value, words) for name, value in table.items()}
     lengths = {len(axis.values) for axis in axes.values()} - {1}
     if len(lengths) > 1:
@@ -224,38 +275,56 @@ def list_design(
     return Columns(axes, table)
 
 
-def _csv(path: Path, words: Mapping[str, Any]) -> dict[str, list[Any]]:
+def _csv(path: Path, words: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns of a CSV file: numbers as arrays, words as lists."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"design.file: cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
-    lines = [line for line in lines if line]
-    if len(lines) < 2:
-        raise InputError(f"design.file: {path} needs a line of names and at least one of numbers")
-    names = [name.strip() for name in lines[0]]
-    for i, line in enumerate(lines[1:], 2):
+        # Spreadsheets put a byte-order mark before the first name.
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            return _columns(path, csv.reader(file), words)
+    except InputError:
+        raise
+    except (OSError, ValueError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"design.file: cannot read {shown_path(path)}: {why}") from None
+
+
+def _columns(path: Path, lines: Iterator[list[str]], words: Mapping[str, Any]) -> dict[str, Any]:
+    names = [name.strip() for name in next((line for line in lines if line), [])]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"design.file: {path} has the column {shown(name)} more than once: keep one of them")
+    columns: dict[str, Any] = {name: [] if name in words else array("d") for name in names}
+    for i, line in enumerate((line for line in lines if line), 2):
         if len(line) != len(names):
             raise InputError(f"design.file: line {i} of {path} has {len(line)} columns: the first has {len(names)}")
-    return {
-        name: [line[k].strip() if name in words else _number(f"{path.name}, {name}", line[k]) for line in lines[1:]]
-        for k, name in enumerate(names)
-    }
+        for name, text in zip(names, line, strict=True):
+            columns[name].append(text.strip() if name in words else _number(f"{path.name}, {shown_key(name)}", text))
+    if not names or not columns[names[0]]:
+        raise InputError(f"design.file: {path} needs a line of names and at least one of numbers")
+    return {name: column if isinstance(column, list) else np.array(column) for name, column in columns.items()}
 
 
 def _number(key: str, value: Any) -> float:
     try:
         number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{key} = {value!r}: must be a number")
+        raise InputError(f"{key} = {shown(value)}: must be a number")
     return number
 
 
-def _whole(head: Mapping[str, Any], name: str, low: int, default: int | None) -> int:
+def _points(head: Mapping[str, Any]) -> int:
+    return _whole(head, "points", 1, MOST_POINTS, None)
+
+
+def _seed(head: Mapping[str, Any]) -> int:
+    return _whole(head, "seed", 0, _LARGEST_SEED, 0)
+
+
+def _whole(head: Mapping[str, Any], name: str, low: int, high: int, default: int | None) -> int:
     value = head.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int) or value < low:
-        given = "is missing" if value is None else f"= {value!r}"
-        raise InputError(f"design.{name} {given}: must be a whole number from {low}")
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        given = "is missing" if value is None else f"= {shown(value)}"
+        raise InputError(f"design.{name} {given}: must be a whole number from {low} to {high}")
     return value

@@ -22,7 +22,7 @@ from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
 from chuteflow.sweeps.study import CHUTE, CONDITIONS, WORDS, Study
-from chuteflow.theory.constitutive import require_positive
+from chuteflow.theory.constitutive import Law, require_positive
 from chuteflow.theory.laws import LAWS, law
 
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
@@ -121,18 +121,18 @@ def _surely_meaningful(parameters: Mapping[str, Array], valid: NDArray[np.bool_]
     out = np.zeros(len(valid), dtype=bool)
     for i, name in enumerate(LAWS):
         if not law(name).knows_slope:
-            good = _meaningful(name)
+            good = _meaningful(law(name))
             out |= (parameters["closure"] == i) & good[below] & good[above]
     return out
 
 
-@lru_cache(maxsize=len(LAWS))
-def _meaningful(closure: str) -> NDArray[np.bool_]:
+@lru_cache(maxsize=8)
+def _meaningful(closure: Law) -> NDArray[np.bool_]:
     """Whether a law that does not know the slope has a meaning at evenly spaced restitutions from 0 to 1."""
     good = np.zeros(_RESTITUTIONS, dtype=bool)
     for i in range(1, _RESTITUTIONS):
         try:
-            require_positive(law(closure), i / (_RESTITUTIONS - 1), 1.0)
+            require_positive(closure, i / (_RESTITUTIONS - 1), 1.0)
         except InputError:
             continue
         good[i] = True

@@ -7,7 +7,6 @@ held as a list of tasks.
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -16,15 +15,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from chuteflow.errors import InputError
+from chuteflow.processes import WorkerPool, death, worker_pool
 from chuteflow.sweeps.store import Marker, Store, StoreError
-from chuteflow.sweeps.work import end_with_parent, work
+from chuteflow.sweeps.work import work
 
 #: Chunks handed out for each worker: one at work and one waiting.
 _AHEAD = 2
+#: Workers at most.
+_MOST_WORKERS = 1024
 #: A chunk that ends this many workers is given up.
 _MOST_DEATHS = 3
-#: Libraries of linear algebra take one thread in a worker: the workers are the threads.
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -40,44 +40,22 @@ def local_workers(count: int) -> Workers:
     """Processes of this machine.
 
     Raises:
-        InputError: for a count below one.
+        InputError: for a count below 1 or above 1024.
+    """
+    require_count(count)
+    return Workers(count, lambda: worker_pool(count))
+
+
+def require_count(count: int) -> None:
+    """Check a number of workers.
+
+    Raises:
+        InputError: where it is below 1 or above 1024.
     """
     if count < 1:
         raise InputError(f"--workers {count}: must be 1 or more")
-
-    @contextmanager
-    def start() -> Iterator[Executor]:
-        from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
-
-        before = {name: os.environ.get(name) for name in _ONE_THREAD}
-        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-        # Spawned, not forked: a worker shares neither lock nor threads with this process.
-        pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_begin)
-        try:
-            yield pool
-        finally:
-            processes = list((getattr(pool, "_processes", None) or {}).values())
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in processes:
-                process.terminate()
-            for process in processes:
-                process.join()
-            for name, value in before.items():
-                if value is None:
-                    os.environ.pop(name, None)
-                else:
-                    os.environ[name] = value
-
-    return Workers(count, start)
-
-
-def _begin() -> None:
-    """Set up a worker: an interrupt is for the client, which ends its workers."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    if count > _MOST_WORKERS:
+        raise InputError(f"--workers {count}: must be {_MOST_WORKERS} or less")
 
 
 def cluster_workers(address: str) -> Workers:
@@ -134,6 +112,7 @@ def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marke
 
     Raises:
         StoreError: where a chunk cannot be written, or ends its worker again and again.
+        WorkerError: where workers cannot start.
     """
     deaths: Counter[int] = Counter()
     left = _Left(iter(chunks), store)
@@ -188,6 +167,8 @@ def _until_broken(
                 marker = future.result()
             except workers.deaths:
                 broken = True
+                if isinstance(executor, WorkerPool) and executor.cannot_start:
+                    raise death(executor) from None
                 deaths[chunk] += 1
                 if deaths[chunk] > _MOST_DEATHS * workers.count:
                     raise StoreError(

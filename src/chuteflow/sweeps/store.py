@@ -1,22 +1,31 @@
-"""Results of a study as a Zarr directory that is whole at every moment.
+"""Results of a study as a Zarr directory that is whole at every moment, and that shows its damage.
 
-One chunk of the study is one chunk of every array. It is written into a folder of its own and renamed into its
-place, array by array, and a marker is renamed into place last: a chunk is done if its marker is there. Whatever
-is killed at whatever moment leaves chunks that are done and chunks that are computed again, to the same bits.
+One chunk of the study is one chunk of every array. Zarr encodes it, with a checksum that its readers verify. It is
+written into a folder of its own and renamed into its place, array by array, and a marker is renamed into place last.
+The marker has the checksums of all files of the chunk, and one of itself: a chunk is done if it has a marker and all
+of them hold. Whatever is killed or damaged at whatever moment leaves chunks that are done and chunks that are
+computed again, to the same bits.
 
     study.zarr/                      zarr.json, and one folder for each array
-    study.zarr/.chuteflow/           study.json, lock, done/NUMBER.json, partial/
+    study.zarr/.chuteflow/           study.json, columns/NAME.npy, lock, done/NUMBER.json, partial/
+
+Stores of version 0.1.0 have no checksums. Their chunks are done if they can be read, with the parameters of their
+points and the counts of their markers.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -27,13 +36,23 @@ from numpy.typing import NDArray
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.steady.quantities import NUMBERS
+from chuteflow.sweeps.designs import shown_path
 from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import Reason, Status, meanings
-from chuteflow.sweeps.study import WORDS, Study, from_canonical
+from chuteflow.sweeps.study import WORDS, Column, Study, from_canonical
 
-_OWN, _DONE, _PARTIAL = ".chuteflow", "done", "partial"
+_OWN, _DONE, _PARTIAL, _COLUMNS = ".chuteflow", "done", "partial", "columns"
 _LEVEL = 1
+#: The version whose markers name none.
+_FIRST_VERSION = "0.1.0"
+#: The name of a marker, and how its content begins: with the checksum of all that follows.
+_MARKER = re.compile(r"\d{8,}\.json", re.ASCII)
+_HEAD = re.compile(rb'\{"crc32": (\d+), ')
+#: Attributes that depend on the versions that wrote the store.
+_OF_VERSIONS = ("source", "history", "study", "study_digest")
+#: What reading an array that is damaged may raise.
+_DAMAGE = (ValueError, RuntimeError, LookupError, TypeError, OSError)
 _TITLE = "Every steady flow of many inclined chutes"
 _PAPER = "Woodhouse, Hogg & Sellar, Rapid granular flows down inclined planar chutes. Part 1, J. Fluid Mech. (2010)"
 _LONG_NAMES = {
@@ -54,9 +73,14 @@ class StoreError(ChuteflowError):
     """A store that cannot be read or written, or is in use."""
 
 
+class DamageError(StoreError):
+    """A chunk or the study of a store that is damaged; says what of it."""
+
+
 @dataclass(frozen=True)
 class Marker:
-    """What is known of a chunk that is done."""
+    """What is known of a chunk that is done. ``sums`` has the checksum of the file of each array, and ``version`` the
+    version of the program that computed the chunk; the first one kept no sums."""
 
     chunk: int
     points: int
@@ -64,6 +88,37 @@ class Marker:
     singly: int
     seconds: float
     failures: dict[int, str]
+    version: str = _FIRST_VERSION
+    sums: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, content: bytes, chunk: int) -> Marker:
+        """The marker of a file's content.
+
+        Raises:
+            DamageError: where that is no marker of this chunk.
+        """
+        head = _HEAD.match(content)
+        try:
+            if head is not None and int(head[1]) != zlib.crc32(content[head.end() :]):
+                raise DamageError("the checksum of its marker differs")
+            given = json.loads(content)
+            if head is not None:
+                del given["crc32"]
+            failures = {int(point): str(why) for point, why in given.pop("failures").items()}
+            marker = cls(failures=failures, **given)
+            counts = (marker.chunk, marker.points, marker.flows, marker.singly)
+            if marker.chunk != chunk or not all(type(count) is int and count >= 0 for count in counts):
+                raise DamageError("its marker is that of another chunk, or of another program")
+        except (ValueError, RecursionError, LookupError, TypeError, AttributeError):
+            raise DamageError("its marker is damaged") from None
+        return marker
+
+    @property
+    def content(self) -> bytes:
+        """The marker as the content of a file."""
+        rest = json.dumps(vars(self), allow_nan=False).encode()[1:]
+        return b'{"crc32": %d, ' % zlib.crc32(rest) + rest
 
 
 @dataclass(frozen=True)
@@ -147,17 +202,25 @@ class Store:
             try:
                 _lay_out(partial, study)
                 os.rename(partial, target)
-            except OSError as error:
+            except (OSError, ValueError) as error:
                 shutil.rmtree(partial, ignore_errors=True)
                 # Another process may have been first.
                 if not (target / _OWN).is_dir():
-                    raise InputError(f"cannot make the store {path}: {error.strerror or error}") from None
-        store = cls.opened(target)
-        if store.study.digest != study.digest:
+                    why = getattr(error, "strerror", None) or error
+                    raise InputError(f"cannot make the store {shown_path(path)}: {why}") from None
+        try:
+            store = cls.opened(target)
+            if store.study.digest == study.digest:
+                return store
             what = ", ".join(_differences(json.loads(store.study.canonical), json.loads(study.canonical)))
-            raise InputError(
-                f"the store {path} holds a different study (it differs in {what}): take another --out, or remove it"
-            )
+            why = f"the store {path} holds a different study (it differs in {what})"
+        except DamageError as error:
+            why = str(error)
+        if _root(target).get("attributes", {}).get("study_digest") != study.digest:
+            raise InputError(f"{why}: take another --out, or remove it")
+        # The arrays are those of the study given, so it is what is kept of that which is damaged.
+        store = cls(target, study)
+        store.write_study()
         return store
 
     @classmethod
@@ -166,66 +229,195 @@ class Store:
 
         Raises:
             InputError: where there is none.
+            DamageError: where its study cannot be read.
         """
         own = Path(path) / _OWN
+        if not own.is_dir():
+            raise InputError(f"{shown_path(path)} is no store of a study: take a path that does not exist yet")
         try:
             text = (own / "study.json").read_text(encoding="utf-8")
-        except OSError:
-            raise InputError(f"{path} is no store of a study: take a path that does not exist yet") from None
-        return cls(Path(path), _study(text))
+            return cls(Path(path), _study(text, own / _COLUMNS))
+        except (OSError, ValueError) as error:
+            # An InputError of the study is a ValueError.
+            why = getattr(error, "strerror", None) or error
+            raise DamageError(f"the study of the store {path} cannot be read: {why}") from None
+
+    def write_study(self) -> None:
+        """Write the study into the store.
+
+        Raises:
+            OSError: where that is impossible.
+        """
+        for name, column in self.study.columns.items():
+            content = io.BytesIO()
+            np.save(content, column, allow_pickle=False)
+            _put(self._own / _COLUMNS / f"{name}.npy", content.getvalue())
+        _put(self._own / "study.json", self.study.canonical.encode())
 
     # What is done
 
     def done(self) -> set[int]:
-        """Numbers of the chunks that are done."""
-        return {int(name[:-5]) for name in os.listdir(self._own / _DONE) if name.endswith(".json")}
+        """Numbers of the chunks that have a marker."""
+        try:
+            names = os.listdir(self._own / _DONE)
+        except OSError:
+            return set()
+        numbers = (int(name[:-5]) for name in names if _MARKER.fullmatch(name))
+        return {number for number in numbers if number < self.study.chunks}
 
     def is_done(self, chunk: int) -> bool:
-        """Whether a chunk is done."""
-        return self._marker(chunk).exists()
+        """Whether a chunk is done, and nothing of it is damaged."""
+        try:
+            self.checked(chunk)
+        except DamageError:
+            return False
+        return True
 
     def marker(self, chunk: int) -> Marker:
-        """What is known of a chunk that is done."""
-        given = json.loads(self._marker(chunk).read_text(encoding="utf-8"))
-        failures = {int(point): why for point, why in given.pop("failures").items()}
-        return Marker(failures=failures, **given)
+        """What is known of a chunk that is done; its arrays are not looked at.
+
+        Raises:
+            DamageError: where it has no marker that can be read.
+        """
+        try:
+            content = _content(f"{self._own}/{_DONE}/{chunk:08d}.json")
+        except OSError:
+            raise DamageError("it has no marker that can be read") from None
+        return Marker.of(content, chunk)
+
+    def checked(self, chunk: int) -> Marker:
+        """What is known of a chunk that is done, once all of it has been checked.
+
+        Raises:
+            DamageError: where anything of it is damaged or missing.
+        """
+        marker = self.marker(chunk)
+        if not marker.sums:
+            self._check_counts(marker)
+            return marker
+        for name, variable in _variables(self.study).items():
+            try:
+                content = _content(
+                    f"{self.path}/{name}/c/{chunk}/0" if variable.by_flow else f"{self.path}/{name}/c/{chunk}"
+                )
+            except OSError:
+                raise DamageError(f"its part of {name} is missing") from None
+            if zlib.crc32(content) != marker.sums.get(name):
+                raise DamageError(f"the checksum of its part of {name} differs")
+        return marker
+
+    def _check_counts(self, marker: Marker) -> None:
+        """Check a chunk without checksums: by its parameters, and the counts of its marker."""
+        names = list(_variables(self.study))
+        for name in names:
+            # Zarr takes a file that is missing for one that is all fill value.
+            if not os.path.isfile(f"{self.path}/{self._key(name, marker.chunk)}"):
+                raise DamageError(f"its part of {name} is missing")
+        first, last = self.study.extent(marker.chunk)
+        rows = self.study.design.rows(first, last)
+        arrays: dict[str, NDArray[Any]] = {}
+        name = "the store"
+        try:
+            group = self._opened(self.path)
+            for name in names:
+                arrays[name] = np.asarray(group[name][first:last])
+        except _DAMAGE:
+            raise DamageError(f"its part of {name} cannot be read") from None
+        # Processors may differ in the last digit of a logarithm.
+        same = all(np.allclose(arrays[name], values, rtol=1e-12, atol=0.0) for name, values in rows.items())
+        counts = last - first == marker.points and int(arrays["n_flows"].sum()) == marker.flows
+        if not (same and counts and (arrays["status"] != Status.NOT_COMPUTED).all()):
+            raise DamageError("its arrays are not those of its marker and of the study")
+
+    def damaged_metadata(self) -> list[str]:
+        """Names of the arrays whose metadata are missing or damaged; "" for those of the whole store."""
+        expected = self._expected(self._versions())
+        names = [name for name, content in expected.items() if _essence(_json(self.path / name)) != _essence(content)]
+        return sorted(name.removesuffix("zarr.json").rstrip("/") for name in names)
 
     # Writing
 
-    def put(self, chunk: int, arrays: Mapping[str, NDArray[Any]], marker: Marker) -> None:
-        """Write a chunk, all or nothing.
+    def mend(self, *versions: str) -> None:
+        """Mend what is damaged of the metadata, and add ``versions`` to those that computed into the store.
+
+        Raises:
+            OSError: where that is impossible.
+        """
+        expected = self._expected(dict.fromkeys((*self._versions(), *versions)))
+        for name, content in expected.items():
+            if _json(self.path / name) != json.loads(content):
+                _put(self.path / name, content)
+
+    def put(self, chunk: int, arrays: Mapping[str, NDArray[Any]], marker: Marker) -> Marker:
+        """Write a chunk, all or nothing, and return its marker with version and checksums.
 
         Raises:
             OSError: where it cannot be written; nothing of it counts then.
         """
         partial = self._own / _PARTIAL / f"{chunk}-{secrets.token_hex(6)}"
-        partial.mkdir(parents=True)
+        _make_folder(partial)
         try:
-            for name, variable in variables(self.study).items():
-                _write(partial / name, self._encoded(variable, arrays[name]))
-            text = json.dumps(vars(marker), allow_nan=False)
-            _write(partial / "marker", text.encode())
+            contents = self._encoded(chunk, arrays)
+            marker = replace(marker, version=__version__, sums={n: zlib.crc32(c) for n, c in contents.items()})
+            for name, content in contents.items():
+                _write(partial / name, content)
+            _write(partial / "marker", marker.content)
             # The status last: where that of a chunk is there, so is the rest.
-            for name, variable in sorted(variables(self.study).items(), key=lambda item: item[0] == "status"):
-                place = self.path / name / "c" / str(chunk)
-                if variable.by_flow:
-                    place.mkdir(parents=True, exist_ok=True)
-                    place = place / "0"
-                else:
-                    place.parent.mkdir(exist_ok=True)
-                os.replace(partial / name, place)
-            os.replace(partial / "marker", self._marker(chunk))
+            for name in sorted(contents, key=lambda name: name == "status"):
+                _place(partial / name, self.path / self._key(name, chunk))
+            _place(partial / "marker", self._own / _DONE / f"{chunk:08d}.json")
         finally:
             shutil.rmtree(partial, ignore_errors=True)
+        return marker
 
-    def _encoded(self, variable: Variable, values: NDArray[Any]) -> bytes:
-        """A chunk as Zarr has it: in full size, little endian, compressed by Zstandard."""
-        from numcodecs.zstd import Zstd
+    def _encoded(self, chunk: int, arrays: Mapping[str, NDArray[Any]]) -> dict[str, bytes]:
+        """The files of a chunk, as Zarr writes them."""
+        from zarr.storage import MemoryStore
 
-        shape = (self.study.chunk, self.study.flows) if variable.by_flow else (self.study.chunk,)
-        whole = np.full(shape, variable.fill, dtype=np.dtype(variable.dtype).newbyteorder("<"))
-        whole[: len(values)] = values
-        return bytes(Zstd(level=_LEVEL).encode(whole.tobytes()))
+        first, last = self.study.extent(chunk)
+        # Into memory, so that a chunk gets to the disk whole or not at all.
+        memory = _buffers(_laid_out(self.study, checksums=self._has_checksums(), versions=()))
+        group = self._opened(MemoryStore(memory))
+        out = {}
+        for name in _variables(self.study):
+            # What is all fill value is written too: a file that is missing is damage.
+            group[name].with_config({"write_empty_chunks": True})[first:last] = arrays[name]
+            out[name] = memory[self._key(name, chunk)].to_bytes()
+        return out
+
+    @staticmethod
+    def _opened(place: Any) -> Any:
+        import zarr
+
+        return zarr.open_group(place, mode="r" if isinstance(place, Path) else "r+", use_consolidated=False)
+
+    # Metadata
+
+    def _key(self, name: str, chunk: int) -> str:
+        """The file of a chunk of an array."""
+        return f"{name}/c/{chunk}/0" if _variables(self.study)[name].by_flow else f"{name}/c/{chunk}"
+
+    def _has_checksums(self) -> bool:
+        """Whether arrays are to have checksums in their files: but in a store of the first version."""
+        for name in _variables(self.study):
+            given = _json(self.path / name / "zarr.json")
+            if given.get("codecs"):
+                return any(codec.get("name") == "crc32c" for codec in given["codecs"])
+        return True
+
+    def _versions(self) -> tuple[str, ...]:
+        """The versions that computed into the store, in their order."""
+        text = _root(self.path).get("attributes", {}).get("source")
+        found = re.findall(r"chuteflow (\S+?)(?:,|$)", text) if isinstance(text, str) else []
+        return tuple(found) or tuple(dict.fromkeys(self._versions_of_chunks()))
+
+    def _versions_of_chunks(self) -> Iterator[str]:
+        for chunk in sorted(self.done()):
+            with suppress(DamageError):
+                yield self.marker(chunk).version
+
+    def _expected(self, versions: Iterable[str]) -> dict[str, bytes]:
+        return _laid_out(self.study, checksums=self._has_checksums(), versions=tuple(versions))
 
     # Clients
 
@@ -238,35 +430,53 @@ class Store:
         Raises:
             StoreError: where another process holds it.
         """
-        import fcntl
-
-        with (self._own / "lock").open("a") as file:
-            try:
-                fcntl.flock(file, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise StoreError(
-                    f"another process computes into {self.path}: wait for it, or compute certain chunks with --chunks "
-                    "in all of them"
-                ) from None
-            except OSError:
-                # A file system without locks: markers still keep every chunk whole.
-                pass
+        with self._lock(alone=alone):
             if alone:
                 with suppress(OSError):
                     shutil.rmtree(self._own / _PARTIAL)
             yield
 
+    def _lock(self, *, alone: bool) -> Any:
+        import sqlite3
+
+        from filelock import ReadWriteLock, Timeout
+
+        try:
+            lock = ReadWriteLock(self._own / "lock", blocking=False, is_singleton=False)
+            return lock.acquire_write() if alone else lock.acquire_read()
+        except Timeout:
+            raise StoreError(
+                f"another process computes into {self.path}: wait for it, or compute certain chunks with --chunks "
+                "in all of them"
+            ) from None
+        except (sqlite3.Error, OSError, ValueError):
+            # A file system without locks, or a file of another program: markers still keep every chunk whole.
+            return nullcontext()
+
     @property
     def _own(self) -> Path:
         return self.path / _OWN
 
-    def _marker(self, chunk: int) -> Path:
-        return self._own / _DONE / f"{chunk:08d}.json"
+
+@lru_cache(maxsize=4)
+def _study(text: str, columns: Path) -> Study:
+    def column(name: str) -> Column:
+        return np.load(columns / f"{name}.npy", allow_pickle=False)
+
+    return from_canonical(text, column)
 
 
 @lru_cache(maxsize=4)
-def _study(text: str) -> Study:
-    return from_canonical(text)
+def _variables(study: Study) -> dict[str, Variable]:
+    return variables(study)
+
+
+# Files
+
+
+def _content(path: str) -> bytes:
+    with open(path, "rb", buffering=0) as file:
+        return file.readall()
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -276,74 +486,136 @@ def _write(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
+def _put(path: Path, content: bytes) -> None:
+    """Write a file, all or nothing."""
+    partial = path.with_name(f".{path.name}-{secrets.token_hex(6)}")
+    _make_folder(path.parent)
+    try:
+        _write(partial, content)
+        _place(partial, path)
+    finally:
+        with suppress(OSError):
+            partial.unlink()
+
+
+def _place(partial: Path, path: Path) -> None:
+    """Rename a file into its place, whatever has got there."""
+    _make_folder(path.parent)
+    if path.is_dir():
+        shutil.rmtree(path)
+    os.replace(partial, path)
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        # A file stands where the store has a folder.
+        for place in (path, *path.parents):
+            if place.is_file():
+                place.unlink()
+                break
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def _json(path: Path) -> dict[str, Any]:
+    """The object in a file; an empty one where there is none."""
+    try:
+        given = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return given if isinstance(given, dict) else {}
+
+
+def _essence(metadata: bytes | dict[str, Any]) -> dict[str, Any]:
+    """Metadata but for what may differ between versions of the program: names of them, and the form of the study."""
+    given = dict(json.loads(metadata) if isinstance(metadata, bytes) else metadata)
+    attributes = given.get("attributes")
+    if isinstance(attributes, dict) and "study" in attributes:
+        study, digest = str(attributes["study"]), attributes.get("study_digest")
+        rest = {name: value for name, value in attributes.items() if name not in _OF_VERSIONS}
+        given["attributes"] = rest | {"sound": hashlib.sha256(study.encode()).hexdigest() == digest}
+    return given
+
+
+def _root(path: Path) -> dict[str, Any]:
+    given = _json(path / "zarr.json")
+    return given if isinstance(given.get("attributes", {}), dict) else {}
+
+
 def _differences(one: Any, other: Any, where: str = "") -> Iterator[str]:
     """Keys in which two tables differ."""
     if isinstance(one, dict) and isinstance(other, dict):
         if list(one) != list(other) and set(one) == set(other):
             yield f"the order of {where or 'keys'}"
-        for key in one.keys() | other.keys():
+        for key in dict.fromkeys((*one, *other)):
             yield from _differences(one.get(key), other.get(key), f"{where}.{key}" if where else key)
     elif one != other:
         yield where
 
 
+# Metadata
+
+
 def _lay_out(path: Path, study: Study) -> None:
     """Make the folders and the metadata of a store without a chunk."""
     (path / _OWN / _DONE).mkdir(parents=True)
-    (path / _OWN / "study.json").write_text(study.canonical, encoding="utf-8")
-    # An empty group, so that readers that list the folder know what it is.
-    _write_json(path / _OWN / "zarr.json", {"zarr_format": 3, "node_type": "group", "attributes": {}})
-    metadata: dict[str, Any] = {}
+    Store(path, study).write_study()
+    for name, content in _laid_out(study, checksums=True, versions=(__version__,)).items():
+        _put(path / name, content)
+
+
+@lru_cache(maxsize=4)
+def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
+    """The metadata of a store by their place in it, as Zarr writes them."""
+    import zarr
+    from zarr.codecs import BytesCodec, Crc32cCodec, ZstdCodec
+    from zarr.storage import MemoryStore
+
+    memory: dict[str, Any] = {}
+    store = MemoryStore(memory)
+    codecs = [ZstdCodec(level=_LEVEL, checksum=False), *([Crc32cCodec()] if checksums else [])]
+    group = zarr.create_group(store, attributes=_attributes(study, versions))
     for name, variable in variables(study).items():
-        (path / name).mkdir()
-        metadata[name] = _array_metadata(study, variable)
-        _write_json(path / name / "zarr.json", metadata[name])
-    group = {
-        "zarr_format": 3,
-        "node_type": "group",
-        "attributes": _attributes(study),
-        # With which readers need not list the folder.
-        "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": metadata},
-    }
-    _write_json(path / "zarr.json", group)
+        flows = (study.flows,) if variable.by_flow else ()
+        group.create_array(
+            name,
+            shape=(study.points, *flows),
+            chunks=(study.chunk, *flows),
+            dtype=variable.dtype,
+            fill_value=variable.fill,
+            serializer=BytesCodec(endian=None if variable.dtype == "int8" else "little"),
+            compressors=codecs,
+            dimension_names=["point", "flow"] if variable.by_flow else ["point"],
+            attributes=variable.attributes,
+        )
+    # An empty group, so that readers that list the folder know what it is.
+    zarr.create_group(store, path=_OWN)
+    contents = {name: content.to_bytes() for name, content in memory.items()}
+    # Readers that know consolidated metadata need not list the folder. Zarr writes them with a warning that they are
+    # not in the standard, which cannot be held back where several threads compute.
+    arrays = {name: json.loads(contents[f"{name}/zarr.json"]) for name in variables(study)}
+    consolidated = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    root = json.loads(contents["zarr.json"]) | {"consolidated_metadata": consolidated}
+    return contents | {"zarr.json": json.dumps(root).encode()}
 
 
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    path.write_text(json.dumps(content), encoding="utf-8")
+def _buffers(contents: Mapping[str, bytes]) -> dict[str, Any]:
+    from zarr.core.buffer import default_buffer_prototype
+
+    return {name: default_buffer_prototype().buffer.from_bytes(content) for name, content in contents.items()}
 
 
-def _attributes(study: Study) -> dict[str, Any]:
+def _attributes(study: Study, versions: tuple[str, ...]) -> dict[str, Any]:
+    programs = ", ".join(f"chuteflow {version}" for version in versions)
     return {
         "Conventions": "CF-1.11",
         "title": study.title or _TITLE,
-        "source": f"chuteflow {__version__}",
-        "history": f"written by chuteflow {__version__}",
+        "source": programs,
+        "history": f"written by {programs}",
         "references": _PAPER,
         "comment": "dimensionless: lengths in grain diameters d, velocities in sqrt(g d cos theta), granular "
         "temperature in g d cos theta, densities in that of a grain; n_flows flows of each point, from hot to cold",
         "study": study.canonical,
         "study_digest": study.digest,
-    }
-
-
-def _array_metadata(study: Study, variable: Variable) -> dict[str, Any]:
-    shape, chunk = [study.points], [study.chunk]
-    if variable.by_flow:
-        shape, chunk = [*shape, study.flows], [*chunk, study.flows]
-    little = {} if variable.dtype == "int8" else {"configuration": {"endian": "little"}}
-    return {
-        "zarr_format": 3,
-        "node_type": "array",
-        "shape": shape,
-        "data_type": variable.dtype,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": "NaN" if variable.fill != variable.fill else variable.fill,
-        "codecs": [
-            {"name": "bytes", **little},
-            {"name": "zstd", "configuration": {"level": _LEVEL, "checksum": False}},
-        ],
-        "attributes": variable.attributes,
-        "dimension_names": ["point", "flow"] if variable.by_flow else ["point"],
-        "storage_transformers": [],
     }

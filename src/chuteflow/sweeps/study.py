@@ -7,19 +7,35 @@ import json
 import math
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
-from chuteflow.sweeps.designs import DESIGNS, Axis, Design, axis_from, list_design
+from chuteflow.sweeps.designs import (
+    DESIGNS,
+    MOST_POINTS,
+    Axis,
+    Design,
+    axis_from,
+    list_design,
+    shown,
+    shown_key,
+    shown_path,
+)
 from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.laws import LAWS
+
+#: A list of numbers or words.
+Column = NDArray[Any]
 
 #: Numbers of a chute: least and largest value, and their names in :class:`chuteflow.Chute`.
 CHUTE = {
@@ -39,7 +55,11 @@ DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_tem
 CHUNKS = {"T_surface": 32768}
 CHUNK = 8192
 TOLERANCE = 1e-8
-_MOST_CHUNK, _MOST_POINTS, _MOST_FLOWS = 1 << 20, 1 << 40, 64
+_MOST_CHUNK, _MOST_FLOWS = 1 << 20, 64
+#: Bytes of a study's file at most.
+_MOST_BYTES = 1 << 28
+#: A longer list of values is known in the canonical form by its length and checksum.
+_LONG = 64
 
 
 @dataclass(frozen=True)
@@ -62,6 +82,8 @@ class Study:
     largest_holdup: float = LARGEST_HOLDUP
     chunk: int = CHUNK
     canonical: str = field(default="", compare=False)
+    #: Lists of values that are too long for the canonical form, by the name of their parameter.
+    columns: Mapping[str, Column] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def points(self) -> int:
@@ -91,19 +113,43 @@ def read(path: str | os.PathLike[str]) -> Study:
     """
     source = Path(path)
     try:
-        text = source.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the study {path}: {getattr(error, 'strerror', None) or error}") from None
+        with source.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        # Some editors put a byte-order mark before the text.
+        text = content.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot read the study {shown_path(path)}: {why}") from None
+    if len(content) > _MOST_BYTES:
+        raise InputError(f"the study {path} has more than {_MOST_BYTES} bytes: give long lists as design.file")
     try:
         given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError(f"the study {path} is not a study: its brackets are nested too deep") from None
+    except ValueError as error:
         raise InputError(f"the study {path} is not TOML: {error}") from None
     return from_dict(given, source.parent)
 
 
-def from_canonical(text: str) -> Study:
-    """The study of a canonical form."""
-    return from_dict(json.loads(text), Path())
+def from_canonical(text: str, column: Callable[[str], Column] | None = None) -> Study:
+    """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it.
+
+    Raises:
+        InputError: for what is no canonical form, or a column that is not the one meant.
+    """
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError("the study is damaged: it is not JSON") from None
+    if not isinstance(given, dict):
+        raise InputError(f"the study is damaged: it is {shown(given)}")
+    parameters = dict(_table(given, "parameters"))
+    for name, value in parameters.items():
+        if column is not None and isinstance(value, Mapping) and "sha256" in value:
+            parameters[name] = column(name)
+            if _outline(parameters[name]) != value:
+                raise InputError(f"the list of parameters.{name} is damaged")
+    return from_dict(given | {"parameters": parameters}, Path())
 
 
 def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
@@ -116,7 +162,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     head, search, results = (_table(given, name) for name in ("design", "search", "results"))
     kind = head.get("kind", "product")
     if kind not in (*DESIGNS, "list"):
-        raise InputError(f"design.kind = {kind!r}: choose one of {', '.join((*DESIGNS, 'list'))}")
+        raise InputError(f"design.kind = {shown(kind)}: choose one of {', '.join((*DESIGNS, 'list'))}")
     parameters = _table(given, "parameters")
     if kind == "list":
         _only(head, "design.", ("kind", "file"))
@@ -134,8 +180,8 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
         for axis in axes.values():
             _check_range(axis)
     design = DESIGNS[kind].make(head, axes) if kind != "list" else Design.listed(axes)
-    if not 1 <= design.points <= _MOST_POINTS:
-        raise InputError(f"the design has {design.points} points: must be from 1 to {_MOST_POINTS}")
+    if not 1 <= design.points <= MOST_POINTS:
+        raise InputError(f"the design has {design.points} points: must be from 1 to {MOST_POINTS}")
     _only(search, "search.", ("tolerance", "surface_temperature", "largest_holdup"))
     _only(results, "results.", ("quantities", "flows", "chunk"))
     tolerance = _number(search, "search.tolerance", TOLERANCE, 1e-10, 1e-3)
@@ -145,7 +191,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     quantities = _quantities(results.get("quantities", list(DEFAULT_QUANTITIES)))
     chunk = JUDGED_CHUNK if wanted(quantities) else CHUNKS.get(condition, CHUNK)
     study = Study(
-        title=str(given.get("title", "")),
+        title=_title(given),
         design=design,
         condition=condition,
         quantities=quantities,
@@ -155,7 +201,9 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
         largest_holdup=deepest,
         chunk=int(_number(results, "results.chunk", chunk, 1, _MOST_CHUNK, whole=True)),
     )
-    object.__setattr__(study, "canonical", _canonical(study, kind, head, parameters))
+    columns = {name: _column(name, value) for name, value in parameters.items() if _is_long(value)}
+    object.__setattr__(study, "columns", columns)
+    object.__setattr__(study, "canonical", _canonical(study, kind, head, {**parameters, **columns}))
     return study
 
 
@@ -178,8 +226,33 @@ def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Map
     return json.dumps(whole, allow_nan=False, separators=(",", ":"))
 
 
+def _is_long(value: Any) -> bool:
+    return isinstance(value, list | np.ndarray) and len(value) > _LONG
+
+
+def _column(name: str, values: Any) -> Column:
+    """A list of values of a parameter as an array of numbers or words."""
+    return np.array(values, dtype=str if name in WORDS else float)
+
+
+def _outline(column: Column) -> dict[str, Any]:
+    """What the canonical form has of a long list."""
+    numbers = column.dtype.kind == "f"
+    content = column.astype("<f8").tobytes() if numbers else "\n".join(column.tolist()).encode()
+    return {"sha256": hashlib.sha256(content).hexdigest(), "values": len(column)}
+
+
+def _title(given: Mapping[str, Any]) -> str:
+    try:
+        return str(given.get("title", ""))
+    except (ValueError, RecursionError):
+        raise InputError(f"title = {shown(given['title'])}: must be a text") from None
+
+
 def _plain(value: Any) -> Any:
-    """A value of the table with numbers as floats, and the keys of a range in order."""
+    """A value of the table with numbers as floats, long lists in outline, and the keys of a range in order."""
+    if isinstance(value, np.ndarray):
+        return _outline(value) if len(value) > _LONG else value.tolist()
     if isinstance(value, Mapping):
         plain = {"scale": "linear"} | {k: v if k in ("points", "scale") else float(v) for k, v in value.items()}
         return dict(sorted(plain.items()))
@@ -193,7 +266,7 @@ def _checked_names(axes: Mapping[str, Axis]) -> str:
     known = (*CHUTE, *CONDITIONS, *WORDS)
     for name in axes:
         if name not in known:
-            raise InputError(f"unknown parameter {name!r}: choose from {', '.join(known)}")
+            raise InputError(f"unknown parameter {shown(name)}: choose from {', '.join(known)}")
     missing = [name for name in CHUTE if name not in axes]
     if missing:
         raise InputError(f"parameters.{missing[0]} is missing: the study needs {', '.join(CHUTE)} and a condition")
@@ -216,24 +289,24 @@ def _check_range(axis: Axis) -> None:
 def _quantities(names: Any) -> tuple[str, ...]:
     known = (*NUMBERS, *KINDS, *JUDGED_NUMBERS)
     if not isinstance(names, list) or not names:
-        raise InputError(f"results.quantities = {names!r}: must be a list of names, from {', '.join(known)}")
+        raise InputError(f"results.quantities = {shown(names)}: must be a list of names, from {', '.join(known)}")
     for name in names:
         if name not in known:
-            raise InputError(f"results.quantities: unknown quantity {name!r}: choose from {', '.join(known)}")
+            raise InputError(f"results.quantities: unknown quantity {shown(name)}: choose from {', '.join(known)}")
     return tuple(dict.fromkeys(names))
 
 
 def _table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     table = given.get(name, {})
     if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {table!r}: must be a table, [{name}]")
+        raise InputError(f"{name} = {shown(table)}: must be a table, [{name}]")
     return table
 
 
 def _only(table: Mapping[str, Any], where: str, known: tuple[str, ...]) -> None:
     for name in table:
         if name not in known:
-            raise InputError(f"unknown key {where}{name}: choose from {', '.join(known)}")
+            raise InputError(f"unknown key {where}{shown_key(name)}: choose from {', '.join(known)}")
 
 
 def _number(
@@ -243,15 +316,16 @@ def _number(
     kinds = int if whole else (int, float)
     if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
         what = "a whole number" if whole else "a number"
-        raise InputError(f"{key} = {value!r}: must be {what} from {low:g} to {high:g}")
-    return value
+        raise InputError(f"{key} = {shown(value)}: must be {what} from {low:g} to {high:g}")
+    return value if whole else float(value)
 
 
 def _interval(value: Any) -> tuple[float, float]:
+    numbers = isinstance(value, list | tuple) and all(type(v) in (int, float) for v in value)
     try:
-        low, high = (float(v) for v in value)
-    except (TypeError, ValueError):
+        low, high = (float(v) for v in value) if numbers else (math.nan, math.nan)
+    except (ValueError, OverflowError):
         low = high = math.nan
     if not math.isfinite(low + high):
-        raise InputError(f"search.surface_temperature = {value!r}: must be two numbers, [low, high]")
+        raise InputError(f"search.surface_temperature = {shown(value)}: must be two numbers, [low, high]")
     return low, high

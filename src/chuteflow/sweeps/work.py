@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import threading
 import time
+from contextlib import suppress
 
 from chuteflow.sweeps.engine import solve_chunk
-from chuteflow.sweeps.store import Marker, Store
+from chuteflow.sweeps.store import DamageError, Marker, Store
 
 
 def work(path: str, chunk: int) -> Marker:
-    """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done already."""
+    """Compute chunk number ``chunk`` of the store at ``path`` and write it; nothing, where it is done and sound."""
     store = Store.opened(path)
-    if store.is_done(chunk):
-        return store.marker(chunk)
+    with suppress(DamageError):
+        return store.checked(chunk)
     begin = time.perf_counter()
     solved = solve_chunk(store.study, chunk)
     marker = Marker(
@@ -25,20 +24,4 @@ def work(path: str, chunk: int) -> Marker:
         seconds=round(time.perf_counter() - begin, 3),
         failures=dict(solved.failures),
     )
-    store.put(chunk, solved.arrays(), marker)
-    return marker
-
-
-def end_with_parent() -> None:
-    """Let this worker end when the process that started it does, however that ends."""
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def wait() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
+    return store.put(chunk, solved.arrays(), marker)

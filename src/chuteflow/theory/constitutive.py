@@ -18,7 +18,7 @@ theta is uniform wherever there is no heat flux, however the density varies.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -110,6 +110,15 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
     )
+
+
+def fingerprint(law: Law, e: float, slope: float) -> list[float]:
+    """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
+    x = np.array([0.0, 0.3, 3.0])
+    room = 1.0 / (1.0 + x / law.densest)
+    g = law.coefficients(x * room, room, e, slope)
+    values = [getattr(g, field.name) for field in fields(g)]
+    return [law.densest, *np.concatenate([np.broadcast_to(value, x.shape) for value in values]).tolist()]
 
 
 def require_positive(law: Law, e: float, slope: float) -> None:

@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from chuteflow import display
 from chuteflow.analysis.boundaries import seeds
 from chuteflow.analysis.boundaries.points import BoundaryPoint
 from chuteflow.analysis.boundaries.system import Sweep
@@ -17,13 +18,16 @@ from chuteflow.analysis.boundaries.tracing import CONTROL, TracedBoundary, trace
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
 from chuteflow.analysis.tracing import TracedFamily
+from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import PARAMETERS
+from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
+from chuteflow.threads import on_one_thread
 
 #: What can be followed.
 KINDS = seeds.KINDS
@@ -43,6 +47,9 @@ class Turning:
     error: float
     position: int
 
+    def __repr__(self) -> str:
+        return display.line("Turning", self.kind, repr(self.flow.chute), Q=self.flow.mass_flux, error=self.error)
+
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
@@ -59,6 +66,18 @@ class Boundary:
     special: tuple[Turning, ...]
     ends: tuple[str, str]
     traced: TracedBoundary = field(repr=False)
+
+    def __repr__(self) -> str:
+        turns = display.counted(len(self.special), "turning point")
+        reach = (display.span(self.second, self.parameter), display.span("Q", self.mass_flux))
+        points = display.counted(len(self.flows), "point")
+        return display.line("Boundary", f"{self.kind} in {self.second}", f"{points}, {turns}", *reach)
+
+    def _repr_html_(self) -> str:
+        columns = [self.parameter, *(getattr(self, name) for name in PLACE), self.error]
+        rows = [[display.number(value) for value in row] for row in zip(*columns, strict=True)]
+        header = [self.second, *(NUMBERS[name].symbol for name in PLACE), "error"]
+        return display.html_table(repr(self)[1:-1], header, rows)
 
     def at(self, value: float, tolerance: float = TOLERANCE) -> list[Flow]:
         """The flows of the boundary whose second parameter has a ``value``, in order along it.
@@ -125,6 +144,22 @@ class BoundarySet(Sequence[Boundary]):
     tolerance: float
     reason: str | None
 
+    def __repr__(self) -> str:
+        count = display.counted(len(self), "boundary", "boundaries")
+        bounds = f"{self.second} from {display.number(self.bounds[0])} to {display.number(self.bounds[1])}"
+        return display.line("BoundarySet", f"{count} of {self.kind}", bounds, self.reason)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [
+                *(str(i), display.counted(len(one.flows), "point"), display.span(self.second, one.parameter)),
+                *(display.span("Q", one.mass_flux), ", ".join(turn.kind for turn in one.special), *one.ends),
+            ]
+            for i, one in enumerate(self, 1)
+        ]
+        header = ["", "points", self.second, "Q", "turning points", "begins at", "ends at"]
+        return display.html_table(repr(self)[1:-1], header, rows, self.reason)
+
     def __len__(self) -> int:
         return len(self.boundaries)
 
@@ -139,6 +174,8 @@ class BoundarySet(Sequence[Boundary]):
         return iter(self.boundaries)
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def boundary(
     chute: Chute,
     *,
@@ -172,9 +209,8 @@ def boundary(
         SolveError: where a boundary could not be followed or a point not solved to the tolerance.
     """
     sweep = _checked(chute, of, second, bounds)
-    if not 2 <= samples <= 1000:
-        raise InputError(f"samples = {samples}: must be from 2 to 1000")
-    checked_tolerance(tolerance)
+    samples = whole("samples", samples, 2, 1000)
+    tolerance = checked_tolerance(tolerance)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
@@ -230,9 +266,9 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
         raise InputError(f"cannot follow {of!r}: choose one of {', '.join(KINDS)}")
     if second not in PARAMETERS:
         raise InputError(f"unknown second parameter {second!r}: choose one of {', '.join(PARAMETERS)}")
-    low, high = bounds
-    sweep = Sweep(chute, second, float(low), float(high))
-    for value in bounds:
+    low, high = pair("bounds", bounds)
+    sweep = Sweep(chute, second, low, high)
+    for value in (low, high):
         sweep.chute_at(value)  # which says what is allowed
     if not low < high:
         raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")

@@ -19,6 +19,8 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import Collocation
 from chuteflow.steady.model import Model, model_along
+from chuteflow.theory.constitutive import Law
+from chuteflow.theory.laws import law
 
 #: Length, in the plane of ln T_surface and ln M, that counts as much as the whole range of the parameter.
 _SPAN = 6.0
@@ -40,7 +42,7 @@ class Sweep:
 
     def models(self, value: float) -> tuple[Model, Model]:
         """The problem at a value of the parameter, and an imaginary step further."""
-        return _models(self, value)
+        return _models(self, law(self.chute.closure), value)
 
     def chute_at(self, value: float) -> Chute:
         """The chute at a value of the parameter, which may be beyond the range by rounding."""
@@ -53,7 +55,8 @@ class Sweep:
 
 
 @lru_cache(maxsize=4)
-def _models(sweep: Sweep, value: float) -> tuple[Model, Model]:
+def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
+    del registered  # known here to tell what is remembered of one law from that of another
     return model_along(sweep.chute, sweep.name, value)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, Range
 from chuteflow.analysis.trajectories import Trajectories, integrate
+from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
@@ -32,7 +33,7 @@ def exists_at(
     Raises:
         InputError: for a temperature or hold-up out of range.
     """
-    temperature = np.atleast_1d(np.asarray(surface_temperature, dtype=float))
+    temperature = np.atleast_1d(real_array("surface_temperature", surface_temperature))
     if temperature.ndim != 1 or not temperature.size:
         raise InputError("surface temperatures must be one number or a list of them")
     Range.checked((float(temperature.min()), 2.0 * float(temperature.max())), largest_holdup)

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from chuteflow.analysis.ranges import Range
 from chuteflow.analysis.trajectories import surface_potential
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.tabulate import Table
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, GRIP, LOSS, SHEAR, WORK, Model, model
+from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, GRIP, LOSS, SHEAR, WORK, Model, evaluate_closures, model
 from chuteflow.theory import boundary
-from chuteflow.theory.laws import law
 
 #: Step in tau, and the largest step in p over the shortest length of the equations.
 _STEP, _LENGTHS_PER_STEP = 0.25, 0.6
@@ -152,16 +152,10 @@ class _Grown:
 
 
 @lru_cache(maxsize=4)
-def _tabulated(closure: str, e: float, slope: float | None) -> Array:
+def _tabulated(table: Table) -> Array:
     """The closures (8, entries) on a uniform grid of L."""
-    chute = Chute(0.3 if slope is None else slope, e, 0.5, 0.6, closure=closure)
-    values, _ = model(chute).closures(np.exp(np.linspace(_LOW, _HIGH, _ENTRIES)))
+    values, _ = evaluate_closures(table, np.exp(np.linspace(_LOW, _HIGH, _ENTRIES)))
     return values
-
-
-def _table(problem: Model) -> Array:
-    chute = problem.chute
-    return _tabulated(chute.closure, chute.restitution, chute.slope if law(chute.closure).knows_slope else None)
 
 
 def _with_increments(values: Array) -> Array:
@@ -181,7 +175,7 @@ def _interpolated(table: Array, big_l: Array) -> Array:
 def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array, mass: float) -> _Grown:
     """Integrate from the surface down, with more columns where neighbours part."""
     square = problem.slope**2
-    closures = _table(problem)
+    closures = _tabulated(problem.table)
     net = closures[LOSS] - square * closures[WORK]
     pace = _with_increments(np.stack([1.0 / closures[CONDUCTION], closures[COUPLING], net]))
     rate = float(np.sqrt(2.0 * np.abs(net) / closures[CONDUCTION]).max())
@@ -385,7 +379,7 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     """The fan of trajectories that were integrated."""
     p, big_l, y, tau = np.moveaxis(grown.states, 1, 0)
     slope = problem.slope
-    closures = _table(problem)
+    closures = _tabulated(problem.table)
     net = closures[LOSS] - slope**2 * closures[WORK]
     in_balance = float(np.abs(np.gradient(net)[np.abs(net).argmin()])) * _SCALE
     wanted = [*closures[[SHEAR, GRIP]], *np.gradient(closures[[SHEAR, GRIP]], axis=1) * _SCALE]

@@ -6,27 +6,28 @@ worked out side by side in processes; the grid of the map is read off them.
 
 from __future__ import annotations
 
-import os
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow import display
 from chuteflow.analysis.domains.columns import Classify, Column, between, column, shares_for, to_halve
 from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS
 from chuteflow.analysis.domains.outlines import Boundary, Region, boundaries, regions
 from chuteflow.analysis.domains.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Searched
+from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
+from chuteflow.processes import worker_pool
 from chuteflow.steady.chute import Chute
+from chuteflow.threads import on_one_thread
 
 #: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
 TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
@@ -36,6 +37,8 @@ _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
 _GUARDS, _LATER_GUARDS = 24, 8
 #: Progress: columns done, and columns known to be needed.
 Progress = Callable[[int, int], None]
+#: Cells along an axis at most.
+LARGEST_SIZE = 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,20 @@ class Domain:
     tolerance: float
     columns: tuple[Column, ...]
     hot_columns: tuple[Column, ...]
+
+    def __repr__(self) -> str:
+        axes = [f"{axis.name} from {axis.low:g} to {axis.high:g}" for axis in (self.plane.x, self.plane.y)]
+        cells = f"{len(self.x)} x {len(self.y)} cells"
+        return display.line("Domain", cells, *axes, f"tolerance {self.tolerance:g} of the axes")
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, str(value), f"{float((values == value).mean()):.2%}"]
+            for name in ("hot", "most", "families", "interior", "density")
+            for values in (getattr(self, name),)
+            for value in np.unique(values)
+        ]
+        return display.html_table(repr(self)[1:-1], ["class", "value", "share of the cells"], rows)
 
     @classmethod
     def on_cells(
@@ -145,6 +162,8 @@ class Domain:
         return grid if plane.transposed else grid.T
 
 
+@on_one_thread
+@np.errstate(under="ignore")
 def domain(
     chute: Chute,
     x: Axis | tuple[str, float, float],
@@ -175,44 +194,32 @@ def domain(
 
     Raises:
         InputError: for a size, tolerance, temperature or range out of bounds, or where a corner is no chute.
+        ChuteflowError: where the processes cannot start, or die.
     """
-    if not (min(size) >= 1 and max(size) <= 5000):
-        raise InputError(f"size {size[0]}x{size[1]}: must be from 1x1 to 5000x5000")
+    size = checked_size(size, 1, LARGEST_SIZE)
+    tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
         raise InputError(f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a share of an axis")
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    temperatures = tuple(number("temperature", t) for t in temperatures)
     for t in temperatures:
         if not within.coldest <= t <= within.hottest:
             raise InputError(
                 f"temperature {t:g}: must be in the range searched, {within.coldest:g} to {within.hottest:g}"
             )
     x, y = (axis if isinstance(axis, Axis) else Axis(*axis) for axis in (x, y))
-    plane = Plane(x, y, chute, tuple(map(float, temperatures)), within)
+    plane = Plane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
         columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
     hot_columns = _hot_columns(plane, tolerance) if chute.surface == "free" else ()
     return Domain.on_cells(plane, size, tolerance, tuple(columns), tuple(hot_columns))
 
 
-@contextmanager
-def _pool(workers: int) -> Iterator[Executor | None]:
+def _pool(workers: int) -> AbstractContextManager[Executor | None]:
     """Processes to compute in, or None for this one."""
     if not 1 <= workers <= 256:
         raise InputError(f"workers = {workers}: must be from 1 to 256")
-    if workers == 1:
-        yield None
-        return
-    # Systems here are small: more threads gain nothing, and take the cores from the other processes.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_parent)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return worker_pool(workers) if workers > 1 else nullcontext()
 
 
 def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:

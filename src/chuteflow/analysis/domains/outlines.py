@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow import display
 from chuteflow.analysis.domains.columns import Column, Part, alike, part
 from chuteflow.analysis.domains.plane import CODES, HOT_CODES, Plane
 
@@ -38,6 +39,10 @@ class Boundary:
     points: NDArray[np.float64]
     temperature: float | None = None
 
+    def __repr__(self) -> str:
+        between = f"between {self.values[0]} and {self.values[1]}"
+        return display.line("Boundary", self.kind, between, display.counted(len(self.points), "point"))
+
 
 @dataclass(frozen=True, eq=False)
 class Region:
@@ -45,6 +50,9 @@ class Region:
 
     value: int
     polygon: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return display.line("Region", f"value {self.value}", display.counted(len(self.polygon), "corner"))
 
 
 #: Kinds of boundaries, and what changes there.

@@ -15,9 +15,11 @@ import numpy as np
 from chuteflow.analysis.domains.fan import Base, Fan, fan
 from chuteflow.analysis.domains.kinds import DENSITIES, INTERIORS, Kinds, kinds
 from chuteflow.analysis.ranges import Range
+from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
+from chuteflow.theory.constitutive import Law
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 from chuteflow.theory.laws import law
 
@@ -57,6 +59,8 @@ class Axis:
     def __post_init__(self) -> None:
         if self.name not in PARAMETERS:
             raise InputError(f"unknown parameter {self.name!r}: choose one of {', '.join(PARAMETERS)}")
+        for end in ("low", "high"):
+            object.__setattr__(self, end, number(self.name, getattr(self, end)))
         if self.name == "roughness":
             # sqrt(3)/2 typed with a few digits rounds up.
             top = ROUGHNESS_RANGE[1]
@@ -139,7 +143,7 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
-    return kinds(_fan(plane, replace(chute, **_neutral(plane))), Base.of(chute))
+    return kinds(_fan(plane, replace(chute, **_neutral(plane)), law(chute.closure)), Base.of(chute))
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:
@@ -149,7 +153,8 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
     """
     chute = plane.chute_at(outer, inner)
-    limit = _dilute(chute.closure, chute.restitution, chute.slope if law(chute.closure).knows_slope else 0.0)
+    closure = law(chute.closure)
+    limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
     found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     gained, lost = found.F21 > 0.0, found.delta > 0.0
     strong = gained and lost
@@ -168,8 +173,9 @@ def _neutral(plane: Plane) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _fan(plane: Plane, chute: Chute) -> Fan:
-    """The fan of all points of ``plane`` whose grains and slope are those of ``chute``."""
+def _fan(plane: Plane, chute: Chute, registered: Law) -> Fan:
+    """The fan of all points of ``plane`` whose grains, with their law, and slope are those of ``chute``."""
+    del registered  # known here to tell what is remembered of one law from that of another
     served = [chute]
     for axis in (plane.x, plane.y):
         if axis.name in _OF_BASE:
@@ -179,5 +185,5 @@ def _fan(plane: Plane, chute: Chute) -> Fan:
 
 
 @lru_cache(maxsize=64)
-def _dilute(closure: str, e: float, slope: float) -> Dilute:
-    return dilute(law(closure), e, slope)
+def _dilute(closure: Law, e: float, slope: float) -> Dilute:
+    return dilute(closure, e, slope)

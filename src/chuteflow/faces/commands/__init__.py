@@ -2,16 +2,16 @@
 
 #: Names and short descriptions, so that the list of commands is printed without importing any.
 COMMANDS = {
-    "solve": "Every steady flow of a chute at a flux, hold-up, depth or temperature.",
-    "curve": "Every family of flows of a chute, with folds and other special points.",
+    "solve": "The steady flows of a chute at a flux, hold-up, centre of mass or temperature.",
+    "curve": "The families of flows of a chute, with folds and other special points.",
     "boundary": "Folds, onsets of density inversion and changes of interior through a second parameter.",
     "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
-    "sweep": "Every flow of very many chutes, as a study says, into a Zarr store.",
+    "sweep": "The flows of very many chutes, as a study says, into a Zarr store.",
     "figures": "Draw figures of the paper.",
     "claims": "Compute every statement of the paper that can be tested, with a verdict on each.",
     "report": "One page with every figure and claim of the paper, recomputed, and verdicts.",
-    "explore": "A page in the browser: drag every parameter, and see every flow.",
+    "explore": "A page in the browser: drag every parameter, and see the flows.",
     "stability": "Which flows are stable, and the disturbance that grows fastest.",
     "growth": "Growth rates of a flow over wavenumbers along and across the slope, and its neutral curves.",
     "neutral": "Growth of waves in one direction along a family of flows, and the neutral curves.",

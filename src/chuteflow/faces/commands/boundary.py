@@ -13,6 +13,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet
 
 #: Second parameters, as options and in Chute, and the numbers that can stand on the vertical axis.
@@ -73,22 +75,25 @@ def command(**given: Any) -> None:
         chute, second=_SECOND[second], bounds=bounds, progress=_progress, **chosen, **options.search(given)
     )
     _clear()
-    if given["save"]:
-        from chuteflow.faces.boundary_records import save
-
-        save(found, given["save"])
-    if given["plot"]:
-        from chuteflow.faces.boundary_plot import plot_boundaries
-        from chuteflow.faces.plots import write_figure
-
-        write_figure(plot_boundaries(found, _UPRIGHT[upright]), given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
         from chuteflow.faces.boundary_records import boundaries_object
 
-        click.echo(contract.text(boundaries_object(found)))
+        answer = contract.text(boundaries_object(found))
     else:
-        click.echo("\n".join(_report(found, second)))
+        answer = "\n".join(_report(found, second))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import boundary_records
+
+        boundary_records.save(found, path)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.boundary_plot import plot_boundaries
+
+        return plot_boundaries(found, _UPRIGHT[upright])
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], Any]:

@@ -45,8 +45,10 @@ def command(only: str | None, section: str | None, listed: bool, as_json: bool, 
         from chuteflow.faces.writing import require_writable
 
         as_json = require_writable(out, _WRITTEN) == ".json"
-    if listed:
-        lines: Iterable[str] = (f"{id:32}  {CLAIMS[id].source}: {CLAIMS[id].statement}" for id in ids)
+    if listed and as_json:
+        lines: Iterable[str] = [_listed(ids)]
+    elif listed:
+        lines = (f"{id:32}  {CLAIMS[id].source}: {CLAIMS[id].statement}" for id in ids)
     elif as_json:
         lines = [_json(list(_watched(check(ids), len(ids))))]
     else:
@@ -55,7 +57,7 @@ def command(only: str | None, section: str | None, listed: bool, as_json: bool, 
         for line in lines:
             click.echo(line)
     else:
-        _write(out, lines)
+        _write(out, "\n".join(lines) + "\n")
 
 
 def _chosen(only: str | None, section: str | None) -> list[str]:
@@ -98,12 +100,26 @@ def _plain(value: Any) -> Any:
     return contract.finite(value) if isinstance(value, float) else value
 
 
-def _write(out: str, lines: Iterable[str]) -> None:
-    from chuteflow.faces.writing import written_beside
+def _listed(ids: Sequence[str]) -> str:
+    """What is claimed and where, as a JSON list; what was not computed is null."""
+    from chuteflow.faces import contract
+    from chuteflow.paper.claims import CLAIMS
 
-    text = "\n".join(lines) + "\n"
-    with written_beside(out) as partial:
-        partial.write_text(text, encoding="utf-8")
+    unknown = dict.fromkeys(("printed", "computed", "verdict"))
+    return contract.text(
+        [{"id": id, "source": CLAIMS[id].source, "statement": CLAIMS[id].statement, **unknown} for id in ids]
+    )
+
+
+def _write(out: str, text: str) -> None:
+    """Write ``text`` to ``out``; where that fails, print it, so that it is not lost."""
+    from chuteflow.faces.writing import write_whole
+
+    try:
+        write_whole(out, text)
+    except InputError:
+        click.echo(text, nl=False)
+        raise
 
 
 def _width() -> int:

@@ -13,6 +13,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import Branch, Curve
     from chuteflow.stability.along import MarkedBranch, MarkedCurve
     from chuteflow.steady.quantities import Scales
@@ -42,16 +44,6 @@ def command(**given: Any) -> None:
     judged = _judged(found, given["samples"]) if given["stability"] else None
     if judged is not None:
         found = judged.curve
-    if given["save"]:
-        from chuteflow.faces.files import save
-
-        save(found, given["save"], scales=scales)
-    if given["plot"]:
-        from chuteflow.faces.plots import plot_curve, write_figure
-        from chuteflow.faces.stability_curve import plot_marked
-
-        figure = plot_curve(found, scales=scales) if judged is None else plot_marked(judged, scales=scales)
-        write_figure(figure, given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
 
@@ -61,9 +53,22 @@ def command(**given: Any) -> None:
 
             for branch, samples in zip(content["branches"], samples_objects(judged, scales), strict=True):
                 branch["stability"] = samples
-        click.echo(contract.text(content))
+        answer = contract.text(content)
     else:
-        click.echo("\n".join(_report(found, judged, scales)))
+        answer = "\n".join(_report(found, judged, scales))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import files
+
+        files.save(found, path, scales=scales)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.plots import plot_curve
+        from chuteflow.faces.stability_curve import plot_marked
+
+        return plot_curve(found, scales=scales) if judged is None else plot_marked(judged, scales=scales)
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _judged(found: Curve, samples: int | None) -> MarkedCurve:
@@ -89,6 +94,7 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
         yield ""
         yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
         yield _points(branch, found, scales)
+        yield from words.validity(branch.flows, found.chute, scales)
         if judged is not None:
             yield _stretches(judged.branches[i - 1], found, scales)
     yield ""

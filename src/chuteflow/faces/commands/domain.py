@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,11 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
+from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.domains import Domain
     from chuteflow.steady.chute import Chute
 
@@ -65,7 +67,7 @@ class Numbers(click.ParamType):
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
 @options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
 @options.search_range_options
-@options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each processor.")
+@options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
 @options.output_options
 def command(**given: Any) -> None:
     """Map, print, save and draw."""
@@ -80,27 +82,30 @@ def command(**given: Any) -> None:
     }
     workers = given["processes"]
     if workers is None:
-        workers = min(os.cpu_count() or 1, _MOST_PROCESSES)
+        workers = min(available_cores(), _MOST_PROCESSES)
     try:
         found = domain(chute, x, y, workers=workers, progress=_progress, **chosen, **options.search(given))
     finally:
         _clear()
-    if given["save"]:
-        from chuteflow.faces.files import save
-
-        save(found, given["save"])
-    if given["plot"]:
-        from chuteflow.faces.domain_plot import plot_domain
-        from chuteflow.faces.plots import write_figure
-
-        write_figure(plot_domain(found), given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
         from chuteflow.faces.domain_records import domain_object
 
-        click.echo(contract.text(domain_object(found)))
+        answer = contract.text(domain_object(found))
     else:
-        click.echo("\n".join(_report(found)))
+        answer = "\n".join(_report(found))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import files
+
+        files.save(found, path)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.domain_plot import plot_domain
+
+        return plot_domain(found)
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:

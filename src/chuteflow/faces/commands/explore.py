@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+import signal
 
 import click
 
@@ -21,6 +21,7 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
     """Serve until interrupted."""
     import uvicorn
 
+    from chuteflow.faces.explorer.connections import Connection, Server
     from chuteflow.faces.explorer.server import LOOPBACK, application, bound
 
     address = host or "127.0.0.1"
@@ -33,11 +34,17 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
         click.echo(f"chuteflow: anyone who reaches {address} can use this server", err=True)
         hosts = None if address in _ANY else (*LOOPBACK, address)
     click.echo(f"The explorer is at {page}   (Ctrl-C ends it)")
-    settings = uvicorn.Config(application(hosts), log_level="warning", lifespan="on", limit_concurrency=256)
+    served = application(hosts)
+    settings = uvicorn.Config(
+        served, http=Connection, ws="none", log_level="error", lifespan="on", timeout_graceful_shutdown=1
+    )
     if not no_browser:
         _open_when_served(page)
-    with suppress(KeyboardInterrupt):  # the way to end it
-        uvicorn.Server(settings).run(sockets=[listener])
+    server = Server(settings, served.state.scheduler.close)
+    # Also before and after the server takes signals itself: interrupts interrupt neither its start nor its end.
+    signal.signal(signal.SIGINT, server.handle_exit)
+    server.run(sockets=[listener])
+    click.echo("The explorer has ended")
 
 
 def _open_when_served(page: str) -> None:

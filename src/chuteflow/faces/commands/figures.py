@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -14,6 +13,7 @@ from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
+from chuteflow.processes import available_cores
 
 
 class Numbers(click.ParamType):
@@ -57,13 +57,13 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     chosen = only or list(FIGURES)
     names = {number: folder / f"figure_{number:02d}.{kind or 'png'}" for number in chosen}
     from chuteflow.faces.plots import write_figure
-    from chuteflow.faces.writing import require_writable, written_beside
+    from chuteflow.faces.writing import require_writable, write_whole
     from chuteflow.paper.data import csv_text
     from chuteflow.paper.sources import source
 
     for path in names.values():
         require_writable(path, options.DRAWN)
-    flows = source(method or METHODS[0], workers())
+    flows = source(method or METHODS[0], available_cores())
     watched = sys.stderr.isatty()
     for number, path in names.items():
         begin = time.perf_counter()
@@ -71,8 +71,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
             click.echo(f"figure {number} ...", nl=False, err=True)
         data = computed(number, flows)
         write_figure(drawn(number, data), path)
-        with written_beside(path.with_suffix(".csv")) as partial:
-            partial.write_text(csv_text(data, method_note(number, flows)), encoding="utf-8")
+        write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))
         unchanged = (
             f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
         )
@@ -95,8 +94,3 @@ def directory(name: str) -> Path:
     except OSError as error:
         raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
     return folder
-
-
-def workers() -> int:
-    """Processes that share the work where that pays: one for each core."""
-    return os.cpu_count() or 1

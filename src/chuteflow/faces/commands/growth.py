@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +14,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.stability.planes import WaveMap
 
 #: Endings of the files that --save writes.
@@ -51,7 +54,7 @@ class Size(click.ParamType):
 @options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
 def command(**given: Any) -> None:
     """Solve, map, print, save and draw."""
-    require_outputs(given)
+    options.require_outputs(given, SAVED)
     chute = options.chute(given)
     condition: dict[str, Any] = options.condition(given, chute, None)
     from chuteflow.analysis.enumeration import flows
@@ -69,39 +72,25 @@ def command(**given: Any) -> None:
     size = {} if given["size"] is None else {"size": given["size"]}
     mapped = wave_map(flow, kx=given["kx"], ky=given["ky"], progress=progress, **size)
     clear()
-    write(given, wave_object(mapped), wave_rows(mapped))
-    if given["plot"] is not None:
+    content = wave_object(mapped)
+
+    def plotted() -> Figure:
         from chuteflow.faces.growth_plot import plot_wave_map
-        from chuteflow.faces.plots import write_figure
 
-        write_figure(plot_wave_map(mapped), given["plot"])
-    click.echo(contract.text(wave_object(mapped)) if given["as_json"] else "\n".join(_report(mapped)))
+        return plot_wave_map(mapped)
 
-
-def require_outputs(given: Mapping[str, Any]) -> None:
-    """Check that files can be written.
-
-    Raises:
-        InputError: for one that cannot.
-    """
-    from chuteflow.faces.writing import require_writable
-
-    for name, suffixes in (("save", SAVED), ("plot", options.DRAWN)):
-        if given[name] is not None:
-            require_writable(given[name], suffixes)
+    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
+    options.deliver(given, answer, partial(write, content, wave_rows(mapped)), plotted)
 
 
-def write(given: Mapping[str, Any], content: Mapping[str, Any], rows: Iterator[list[str]]) -> None:
-    """Write what --save asks for."""
-    if given["save"] is None:
-        return
+def write(content: Mapping[str, Any], rows: Iterator[list[str]], path: str) -> None:
+    """Write a map, as ``content`` or as ``rows``, to ``path``."""
     from chuteflow.faces import contract
-    from chuteflow.faces.writing import written_beside
+    from chuteflow.faces.writing import write_whole
 
-    as_json = given["save"].lower().endswith(".json")
+    as_json = path.lower().endswith(".json")
     text = contract.text(content) if as_json else "\n".join(",".join(row) for row in rows)
-    with written_beside(given["save"]) as partial:
-        partial.write_text(text + "\n", encoding="utf-8")
+    write_whole(path, text + "\n")
 
 
 def progress(share: float) -> None:

@@ -78,7 +78,7 @@ def _laws(found: HotModel) -> Iterator[list[str]]:
     yield ["mass flux", "Q ~ sqrt(T_inf)", f"Q = {_power_of_ten(flux)} sqrt(T_inf)"]
     yield ["centre of mass", "h ~ T_inf", f"h = {_power_of_ten(height)} T_inf"]
     yield ["hold-up", "M -> constant", f"M = {holdup:.5g}"]
-    yield ["depth and flux", "h ~ Q^2", f"h = {_power_of_ten(height - 2.0 * flux)} Q^2"]
+    yield ["centre of mass and flux", "h ~ Q^2", f"h = {_power_of_ten(height - 2.0 * flux)} Q^2"]
     yield ["largest density", "nu ~ 1/T_inf", f"nu = {found.largest_volume_fraction:.5g} / T_inf"]
 
 

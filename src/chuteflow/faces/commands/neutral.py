@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,9 +11,11 @@ import click
 from chuteflow.errors import InputError
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.faces.commands.growth import Size, clear, progress, require_outputs, write
+from chuteflow.faces.commands.growth import SAVED, Size, clear, progress, write
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.stability.planes import FamilyMap
     from chuteflow.steady.flow import Flow
 
@@ -39,7 +42,7 @@ _EPILOG = (
 @options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
 def command(**given: Any) -> None:
     """Trace, map, print, save and draw."""
-    require_outputs(given)
+    options.require_outputs(given, SAVED)
     chute = options.chute(given)
     angle = _angle(given["waves"])
     within: dict[str, Any] = {"surface_temperature": given["search_temperature"] or _TEMPERATURES}
@@ -59,13 +62,15 @@ def command(**given: Any) -> None:
     asked = {name: given[option] for name, option in (("depth_wavenumber", "kh"), ("size", "size")) if given[option]}
     mapped = family_map(traced.branches[0].flows, angle=angle, progress=progress, **asked)
     clear()
-    write(given, family_object(mapped), family_rows(mapped))
-    if given["plot"] is not None:
-        from chuteflow.faces.growth_plot import plot_family_map
-        from chuteflow.faces.plots import write_figure
+    content = family_object(mapped)
 
-        write_figure(plot_family_map(mapped), given["plot"])
-    click.echo(contract.text(family_object(mapped)) if given["as_json"] else "\n".join(_report(mapped)))
+    def plotted() -> Figure:
+        from chuteflow.faces.growth_plot import plot_family_map
+
+        return plot_family_map(mapped)
+
+    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
+    options.deliver(given, answer, partial(write, content, family_rows(mapped)), plotted)
 
 
 def _angle(waves: str | None) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +15,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.stability.layer import Layer
     from chuteflow.stability.relaxation import Moment, Outcome
@@ -55,12 +58,9 @@ _EPILOG = (
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
     from chuteflow.faces import contract
-    from chuteflow.faces.writing import require_writable
     from chuteflow.stability.relaxation import outcome
 
-    for name, suffixes in (("save", _SAVED), ("plot", options.DRAWN)):
-        if given[name] is not None:
-            require_writable(given[name], suffixes)
+    options.require_outputs(given, _SAVED)
     duration = 2000.0 if given["duration"] is None else given["duration"]
     if not 0.0 < duration <= 1e8:
         raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
@@ -74,11 +74,8 @@ def command(**given: Any) -> None:
     moments = _followed(layer, start, duration)
     end = outcome(layer, moments)
     content = _content(flow, moments, end)
-    if given["save"] is not None:
-        _save(content, given["save"])
-    if given["plot"] is not None:
-        _plot(flow, moments, end, given["plot"])
-    click.echo(contract.text(content) if given["as_json"] else "\n".join(_told(flow, moments, end)))
+    answer = contract.text(content) if given["as_json"] else "\n".join(_told(flow, moments, end))
+    options.deliver(given, answer, partial(_save, content), partial(_plotted, flow, moments, end))
 
 
 def _found(given: Mapping[str, Any]) -> FlowSet:
@@ -168,22 +165,21 @@ def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
 
 def _save(content: dict[str, Any], path: str) -> None:
     from chuteflow.faces import contract
-    from chuteflow.faces.writing import written_beside
+    from chuteflow.faces.writing import write_whole
 
-    with written_beside(path) as partial:
-        if path.lower().endswith(".json"):
-            partial.write_text(contract.text(content) + "\n", encoding="utf-8")
-        else:
-            rows = zip(*(content[symbol] for symbol in _COLUMNS), strict=True)
-            lines = [",".join(_COLUMNS), *(",".join(map(repr, row)) for row in rows)]
-            partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if path.lower().endswith(".json"):
+        write_whole(path, contract.text(content) + "\n")
+    else:
+        rows = zip(*(content[symbol] for symbol in _COLUMNS), strict=True)
+        lines = [",".join(_COLUMNS), *(",".join(map(repr, row)) for row in rows)]
+        write_whole(path, "\n".join(lines) + "\n")
 
 
-def _plot(flow: Flow, moments: Sequence[Moment], end: Outcome, path: str) -> None:
+def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Figure:
     """Q, h and T at the base against the logarithm of time, and their values in the steady flows."""
     from matplotlib.lines import Line2D
 
-    from chuteflow.faces.plots import parameters, write_figure
+    from chuteflow.faces.plots import parameters
     from chuteflow.paper import style
 
     figure, axes = style.panels(3, height=3.1)
@@ -193,7 +189,7 @@ def _plot(flow: Flow, moments: Sequence[Moment], end: Outcome, path: str) -> Non
         ax.plot([m.time for m in later], [getattr(m, name) for m in later], **style.stroke(0).line())
         for steady in end.steady:
             ax.axhline(getattr(steady, name), **rest.line(0.8))
-        ax.set_xscale("log")
+        style.logarithmic(ax, "x")
         style.name_axes(ax, "time, $t$", style.label(name))
     key = [
         Line2D([], [], label="disturbed flow", **style.stroke(0).line()),
@@ -201,4 +197,4 @@ def _plot(flow: Flow, moments: Sequence[Moment], end: Outcome, path: str) -> Non
     ]
     style.caption(figure, parameters(flow.chute))
     style.legend(figure, handles=key, loc="outside lower center", ncols=2)
-    write_figure(figure, path)
+    return figure

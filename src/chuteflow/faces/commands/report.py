@@ -10,8 +10,9 @@ import click
 
 from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
-from chuteflow.faces.commands.figures import METHOD_HELP, Numbers, directory, workers
+from chuteflow.faces.commands.figures import METHOD_HELP, Numbers, directory
 from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
+from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
     from chuteflow.faces.report import Shown
@@ -30,19 +31,18 @@ _NAME = "index.html"
 def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool) -> None:
     """Compute all, and write the page at the end, whole or not at all."""
     path = directory(out or ".") / _NAME
-    from chuteflow.faces.writing import require_writable, written_beside
+    from chuteflow.faces.writing import require_writable, write_whole
 
     require_writable(path, (".html",))
     started, begin = datetime.now().astimezone(), time.perf_counter()
     from chuteflow.faces.report import Report, page
     from chuteflow.paper.sources import source
 
-    flows = source(method or METHODS[0], workers())
+    flows = source(method or METHODS[0], available_cores())
     figures = [_drawn(number, flows) for number in only or FIGURES]
     verdicts = [] if no_claims else _checked()
     report = Report(figures, verdicts, flows.words, started, time.perf_counter() - begin)
-    with written_beside(path) as partial:
-        partial.write_text(page(report), encoding="utf-8")
+    write_whole(path, page(report))
     click.echo(f"{path}: {len(figures)} figures, {len(verdicts)} claims, {report.seconds:.0f} s")
 
 

@@ -1,4 +1,4 @@
-"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, depth or temperature."""
+"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, centre of mass or temperature."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.steady.quantities import Scales
 
@@ -50,20 +52,24 @@ def command(**given: Any) -> None:
     from chuteflow.analysis.enumeration import flows
 
     found = flows(chute, **condition, **options.search(given))
-    if given["save"]:
-        from chuteflow.faces.files import save
-
-        save(found, given["save"], scales=scales)
-    if given["plot"]:
-        from chuteflow.faces.plots import plot_flows, write_figure
-
-        write_figure(plot_flows(found, scales=scales), given["plot"])
     if given["as_json"]:
         from chuteflow.faces import contract
 
-        click.echo(contract.text(contract.flow_set_object(found, scales)))
+        answer = contract.text(contract.flow_set_object(found, scales))
     else:
-        click.echo("\n".join(_report(found, scales)))
+        answer = "\n".join(_report(found, scales))
+
+    def save(path: str) -> None:
+        from chuteflow.faces import files
+
+        files.save(found, path, scales=scales)
+
+    def plotted() -> Figure:
+        from chuteflow.faces.plots import plot_flows
+
+        return plot_flows(found, scales=scales)
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
@@ -75,18 +81,25 @@ def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
     if found.flows:
         columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
         header = [
-            ["", *cells, end] for cells, end in zip(tables.heading(columns, scales), ("error", "[1]"), strict=False)
+            ["", *cells, end, word]
+            for cells, end, word in zip(
+                tables.heading(columns, scales), ("error", "[1]"), ("validity", ""), strict=False
+            )
         ]
         rows = [
-            [str(i), *tables.numbers(flow, columns, found.chute, scales), f"{flow.error:.0e}"]
+            [
+                *(str(i), *tables.numbers(flow, columns, found.chute, scales)),
+                *(f"{flow.error:.0e}", flow.validity.summary),
+            ]
             for i, flow in enumerate(found, 1)
         ]
         yield ""
-        yield tables.table([*header, *rows])
+        yield tables.table([*header, *rows], words=(len(columns) + 2,))
         yield ""
         for i, flow in enumerate(found, 1):
             yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
         yield ""
+        yield from words.notes(found)
         largest = max(flow.error for flow in found)
         yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
     else:

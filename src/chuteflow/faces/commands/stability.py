@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +13,8 @@ from chuteflow.faces import options
 from chuteflow.faces.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.analysis.results import FlowSet
     from chuteflow.faces.stability_records import Answer
     from chuteflow.stability.modes import Mode
@@ -41,35 +44,31 @@ _MOST = 20
 @options.option("--save", metavar="FILE", help="Write everything to FILE: .csv, or .json with the fields of the modes.")
 def command(as_json: bool, **given: Any) -> None:
     """Solve, search, print, save and draw."""
-    from chuteflow.faces.writing import require_writable
-
     chute = options.chute(given)
     condition = options.condition(given, chute, None)
     count = 1 if given["count"] is None else given["count"]
     if not 1 <= count <= _MOST:
         raise InputError(f"--modes {count}: must be from 1 to {_MOST}")
-    for name, suffixes in (("save", _SAVED), ("plot", options.DRAWN)):
-        if given[name] is not None:
-            require_writable(given[name], suffixes)
+    options.require_outputs(given, _SAVED)
     from chuteflow.analysis.enumeration import flows
     from chuteflow.stability.modes import check_wavenumbers
 
     check_wavenumbers(given["kx"] or 0.0, given["ky"] or 0.0)
     found = flows(chute, **condition, **options.search(given))
     answers = [_answer(flow, given["kx"], given["ky"], count) for flow in found]
-    if given["save"] is not None:
-        _save(found, answers, given["save"])
-    if given["plot"] is not None:
-        from chuteflow.faces.plots import write_figure
-        from chuteflow.faces.stability_plot import plot_modes
-
-        write_figure(plot_modes(found, answers), given["plot"])
     if as_json:
         from chuteflow.faces import contract, stability_records
 
-        click.echo(contract.text(stability_records.answers_object(found, answers)))
+        answer = contract.text(stability_records.answers_object(found, answers))
     else:
-        click.echo("\n".join(_report(found, answers)))
+        answer = "\n".join(_report(found, answers))
+
+    def plotted() -> Figure:
+        from chuteflow.faces.stability_plot import plot_modes
+
+        return plot_modes(found, answers)
+
+    options.deliver(given, answer, partial(_save, found, answers), plotted)
 
 
 def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answer:
@@ -88,14 +87,13 @@ def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answe
 
 def _save(found: FlowSet, answers: Sequence[Answer], path: str) -> None:
     from chuteflow.faces import contract, stability_records
-    from chuteflow.faces.writing import written_beside
+    from chuteflow.faces.writing import write_whole
 
-    with written_beside(path) as partial:
-        if path.lower().endswith(".json"):
-            text = contract.text(stability_records.answers_object(found, answers, fields=True))
-        else:
-            text = "\n".join(",".join(row) for row in stability_records.csv_rows(answers))
-        partial.write_text(text + "\n", encoding="utf-8")
+    if path.lower().endswith(".json"):
+        text = contract.text(stability_records.answers_object(found, answers, fields=True))
+    else:
+        text = "\n".join(",".join(row) for row in stability_records.csv_rows(answers))
+    write_whole(path, text + "\n")
 
 
 def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:

@@ -19,18 +19,19 @@ from chuteflow.faces import contract
 from chuteflow.faces.explorer import queries, sentences
 from chuteflow.faces.explorer.queries import GRAINS, Query
 from chuteflow.faces.explorer.recipes import recipes
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
 #: Relative error allowed: far below what can be seen on a page. Exports are exact.
 _VISIBLE = 1e-6
 _CURVE_POINTS = 90
-#: Heights of a profile: in the flow itself, and above it up to where the profiles of all flows end.
-_WITHIN, _ABOVE = 61, 20
+#: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
+#: they are halved until a straight line across each is off by this share of a field's largest value at most.
+_INTERVALS, _STRAIGHT, _HALVINGS = 16, 1e-3, 8
 #: A flow itself is so many times as high as its centre of mass; so are all profiles, by the highest of the flows.
 _TOP = 2.5
 _FIELDS = {
-    "z": "height",
     "nu": "volume_fraction",
     "T": "granular_temperature",
     "u": "velocity",
@@ -38,6 +39,8 @@ _FIELDS = {
     "dissipation": "dissipation",
 }
 _DIGITS = 7
+#: What else a computation may end with, which is no reason to end the process.
+_FAILURES = (ArithmeticError, ValueError, LookupError)
 
 
 @dataclass(frozen=True)
@@ -57,12 +60,34 @@ def answer(question: str, query: Query) -> Answer:
     except InputError as error:
         return problem(400, str(error))
     except ChuteflowError as error:
-        return problem(422, str(error))
+        return left_out(question, query, str(error))
+    except _FAILURES as error:
+        return left_out(question, query, f"the computation failed ({type(error).__name__}: {error})")
 
 
 def problem(status: int, what: str) -> Answer:
     """An answer that says what went wrong."""
     return _json({"error": " ".join(what.split())}, status)
+
+
+#: What is left out where a question has no answer.
+_LEFT_OUT = {
+    "flows": "the flows at this flux are left out",
+    "curve": "the curve of all flows is left out",
+    "map": "this column of the map is left out",
+    "export": "this file is left out",
+    "stability": "the stability of this flow is left out",
+}
+
+
+def left_out(question: str, query: Query, why: str) -> Answer:
+    """An answer that says what is left out and why; in place of flows, also how to compute them elsewhere."""
+    content: dict[str, Any] = {"error": " ".join(f"{_LEFT_OUT[question]}: {why}".split())}
+    if question == "flows":
+        chute, other = queries.read(query, other=("Q",), optional=GRAINS)
+        ways = recipes(chute, queries.flux(other["Q"]), queries.scales(other))
+        content |= {"chute": contract.chute_object(chute), "flows": [], "recipes": ways}
+    return _json(content, 422)
 
 
 def _json(content: Any, status: int = 200) -> Answer:
@@ -76,8 +101,7 @@ def _flows(query: Query) -> Answer:
     top = _TOP * max((flow.centre_of_mass for flow in found), default=1.0)
     shown = [
         {
-            **{NUMBERS[name].symbol: getattr(flow, name) for name in contract.PLACE},
-            "error": flow.error,
+            **_place(flow),
             "profile": _profile(flow, top),
             "budget": asdict(flow.energy_budget) | {"heat_from_base": flow.energy_budget.heat_from_base},
             **sentences.of_flow(flow, found),
@@ -95,15 +119,40 @@ def _flows(query: Query) -> Answer:
     )
 
 
+def _place(flow: Flow) -> dict[str, Any]:
+    """Where a flow is on the curve, how well that is known, and how far the flow keeps to the theory."""
+    told = contract.flow_object(flow)
+    names = (*(NUMBERS[name].symbol for name in contract.PLACE), "error", "validity")
+    return {name: told[name] for name in names if name in told}
+
+
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
-    """Fields over height, closest in the flow itself, where they change."""
+    """Fields over height, at so many heights that straight lines between them show no corner that is not there."""
     highest = min(top, flow.interface_height)
     own = min(_TOP * flow.centre_of_mass, highest)
-    heights = np.linspace(0.0, own, _WITHIN)
-    if own < highest:
-        heights = np.append(heights, np.linspace(own, highest, _ABOVE + 1)[1:])
+    heights = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
+    fields = _fields(flow, heights)
+    bends = np.ones(len(heights) - 1, dtype=bool)
+    for _ in range(_HALVINGS):
+        middles = 0.5 * (heights[1:] + heights[:-1])[bends]
+        exact = _fields(flow, middles)
+        straight = 0.5 * (fields[:, 1:] + fields[:, :-1])[:, bends]
+        off = (np.abs(exact - straight) > _STRAIGHT * np.abs(fields).max(axis=1, keepdims=True)).any(axis=0)
+        places = np.flatnonzero(bends) + 1
+        heights, fields = np.insert(heights, places, middles), np.insert(fields, places, exact, axis=1)
+        # Both halves of an interval that bends are looked at again, the others are done.
+        halves = np.where(bends, 2, 1)
+        bends[bends] = off
+        bends = np.repeat(bends, halves)
+        if not off.any():
+            break
+    return {"z": _short(heights)} | {name: _short(field) for name, field in zip(_FIELDS, fields, strict=True)}
+
+
+def _fields(flow: Flow, heights: Array) -> Array:
+    """The fields (fields, heights) that the page shows."""
     profile = flow.profile(heights)
-    return {symbol: _short(getattr(profile, name)) for symbol, name in _FIELDS.items()}
+    return np.array([getattr(profile, name) for name in _FIELDS.values()])
 
 
 def _short(values: np.ndarray) -> list[float]:
@@ -117,6 +166,8 @@ def _curve(query: Query) -> Answer:
     content = contract.curve_object(found)
     for branch, entry in zip(found.branches, content["branches"], strict=True):
         entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
+        if "validity" in entry:
+            entry["validity"] = {"words": entry["validity"]["words"]}
     return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
 
 
@@ -127,8 +178,7 @@ def _rounded(branch: Branch) -> dict[str, list[float]]:
 def _map(query: Query) -> Answer:
     from chuteflow.faces.explorer.domains import map_column
 
-    chute, (x, y), place = queries.plane(query)
-    return _json(asdict(map_column(chute, x, y, place)))
+    return _json(asdict(map_column(queries.map_column(query))))
 
 
 def _stability(query: Query) -> Answer:

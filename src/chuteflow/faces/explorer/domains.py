@@ -8,7 +8,7 @@ from functools import lru_cache, partial
 from chuteflow.analysis.domains.columns import Part, column
 from chuteflow.analysis.domains.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
 from chuteflow.faces.contract import PARAMETERS
-from chuteflow.faces.explorer.queries import CONTROLS
+from chuteflow.faces.explorer.queries import CONTROLS, ColumnAsked
 from chuteflow.steady.chute import Chute
 
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
@@ -34,16 +34,17 @@ class MapColumn:
     tolerance: float
 
 
-def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
-    """The column of the map over ``x`` and ``y`` (names of a query) at a share of its outer axis.
+def map_column(asked: ColumnAsked) -> MapColumn:
+    """The column of the map that is asked for.
 
     Raises:
         InputError: where a corner of the map is no chute.
     """
-    plane = _plane(chute, x, y)
+    x, y, place = asked.x, asked.y, asked.place
+    plane = _plane(asked.chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE[inner in _OF_BASE]
-    found = column(place, partial(summary, plane), _evenly(_FIRST), tolerance)
+    found = column(place, partial(summary, plane), [*_evenly(_FIRST), *_beside(plane, asked, tolerance)], tolerance)
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
     if plane.chute.surface == "free":
@@ -56,6 +57,12 @@ def map_column(chute: Chute, x: str, y: str, place: float) -> MapColumn:
         {name: Part(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
+
+
+def _beside(plane: Plane, asked: ColumnAsked, tolerance: float) -> list[float]:
+    """Shares of the inner axis a little to either side of what is near, closer together than what is halved."""
+    shares = [(value - plane.inner.low) / (plane.inner.high - plane.inner.low) for value in asked.near]
+    return [share + side * tolerance for share in shares for side in (-0.49, 0.49)]
 
 
 @lru_cache(maxsize=8)

@@ -136,10 +136,27 @@ def scales(given: Query) -> Scales | None:
     return Scales(_number("diameter", given["diameter"], 1e-9, 1e3), _number("density", given["density"], 1e-3, 1e6))
 
 
-def plane(query: Query) -> tuple[Chute, tuple[str, str], float]:
-    """The chute, the two parameters across and up, and the place (share of the outer axis) of a column of the map.
+@dataclass(frozen=True)
+class ColumnAsked:
+    """A column of the map: the chute, the two parameters across and up, the place (share of the outer axis), and
+    values of the inner parameter (``near``) at which the classes of the columns beside it change.
 
     The chute has the axes' own parameters at the low ends of their ranges.
+    """
+
+    chute: Chute
+    x: str
+    y: str
+    place: float
+    near: tuple[float, ...]
+
+
+#: Values near which the classes of a column are looked at closely, at most.
+MOST_NEAR = 32
+
+
+def map_column(query: Query) -> ColumnAsked:
+    """The column of the map that a query asks for.
 
     Raises:
         InputError: for parameters that are missing, unknown, the same or out of range.
@@ -153,8 +170,12 @@ def plane(query: Query) -> tuple[Chute, tuple[str, str], float]:
     if x == y:
         raise InputError(f"x and y are both {x}: give two parameters")
     held = dict(query) | {name: str(CONTROLS[name].low) for name in (x, y)}
-    chute, other = read(held, other=("x", "y", "place"))
-    return chute, (x, y), _number("place", other["place"], 0.0, 1.0)
+    chute, other = read(held, other=("x", "y", "place"), optional=("near",))
+    near = [text for text in other.get("near", "").split(",") if text]
+    if len(near) > MOST_NEAR:
+        raise InputError(f"near has {len(near)} values: give at most {MOST_NEAR}")
+    values = tuple(_number("near", text, -1.0, 2.0) for text in near)
+    return ColumnAsked(chute, x, y, _number("place", other["place"], 0.0, 1.0), values)
 
 
 def _number(name: str, text: str, low: float, high: float) -> float:

@@ -1,12 +1,12 @@
-"""The server of the explorer: the page, its parts, and its questions handed to the lanes."""
+"""The server of the explorer: the page, its parts, and its questions handed to the scheduler."""
 
 from __future__ import annotations
 
-import asyncio
+import json
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,9 @@ from starlette.staticfiles import StaticFiles
 from chuteflow import __version__
 from chuteflow.errors import InputError
 from chuteflow.faces.explorer import queries
-from chuteflow.faces.explorer.answers import QUESTIONS, Answer
-from chuteflow.faces.explorer.lanes import Lane
+from chuteflow.faces.explorer.answers import QUESTIONS, Answer, answer
+from chuteflow.faces.explorer.scheduler import Scheduler
+from chuteflow.faces.explorer.worker import Compute
 from chuteflow.steady.quantities import QUANTITIES
 
 if TYPE_CHECKING:
@@ -33,23 +34,6 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 PAGE = Path(__file__).parent / "page"
 
 
-@dataclass(frozen=True)
-class _Terms:
-    """Seconds that one answer may take, by how much its process gives way, and whether it is broken off unheard."""
-
-    limit: float
-    nice: int
-    breaks_off: bool = False
-
-
-#: Each question has a process of its own, so that quick ones never wait for slow ones; and slow ones give way.
-_TERMS = {
-    "flows": _Terms(10.0, 0),
-    "curve": _Terms(20.0, 5),
-    "export": _Terms(60.0, 4),
-    "map": _Terms(30.0, 10),
-    "stability": _Terms(60.0, 12, breaks_off=True),
-}
 _LONGEST_QUERY = 1000
 _HEADERS = {
     b"content-security-policy": b"default-src 'self'; img-src 'self' data: blob:; style-src 'self'; "
@@ -101,23 +85,15 @@ def host_of(header: str) -> str:
     return (name if colon and port.isdigit() else header).strip("[]").lower()
 
 
-def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
-    """The application, for requests to one of ``hosts``, or to any for None."""
-    lanes = {question: Lane(**asdict(_TERMS[question])) for question in QUESTIONS}
+def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer) -> Starlette:
+    """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``."""
+    scheduler = Scheduler(compute)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        first = {name: str(value) for name, value in queries.PRESETS[0].state.items()}
-        chute = {name: value for name, value in first.items() if name != "Q"}
-        warming = [
-            asyncio.ensure_future(lanes["flows"].ask("flows", first)),
-            asyncio.ensure_future(lanes["curve"].ask("curve", chute)),
-        ]
+        scheduler.start()
         yield
-        for task in warming:
-            task.cancel()
-        for lane in lanes.values():
-            lane.close()
+        scheduler.close()
 
     def asked(question: str) -> Callable[[Request], Any]:
         async def respond(request: Request) -> Response:
@@ -125,11 +101,13 @@ def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
             repeated = next((name for name in names if names.count(name) > 1), None)
             if repeated is not None:
                 return _error(400, f"{repeated[:40]!r} is given several times: give it once")
-            return _response(await lanes[question].ask(question, request.query_params, request.is_disconnected))
+            client = (request.client.host, request.client.port) if request.client else ("", 0)
+            given = await scheduler.ask(question, request.query_params, client, request.is_disconnected)
+            return _response(given, told=request.headers.get("x-status") == "in-answer")
 
         return respond
 
-    return Starlette(
+    served = Starlette(
         routes=[
             Route("/", _page),
             Route("/about", _about),
@@ -140,6 +118,8 @@ def application(hosts: Sequence[str] | None = LOOPBACK) -> Starlette:
         exception_handlers={HTTPException: _refused, Exception: _failed},
         lifespan=lifespan,
     )
+    served.state.scheduler = scheduler
+    return served
 
 
 def bound(host: str, port: int | None) -> socket.socket:
@@ -192,7 +172,13 @@ async def _about(_: Request) -> Response:
     )
 
 
-def _response(given: Answer) -> Response:
+def _response(given: Answer, told: bool) -> Response:
+    """The answer with its status; one that is no success is ``told`` in the answer itself, if that is wanted.
+
+    Browsers report every other status as an error of the page, which a refusal is not.
+    """
+    if told and given.status >= 400:
+        return JSONResponse(json.loads(given.body) | {"status": given.status})
     headers = {} if given.name is None else {"content-disposition": f'attachment; filename="{given.name}"'}
     if given.status == 503:
         headers["retry-after"] = "1"

@@ -1,26 +1,35 @@
 // Questions to the server.
 
-/** The answer to a question; `signal` takes it back, which the server notices. */
+// How often a question is asked again that the server has no room for, and after how many milliseconds.
+const attempts = 10, pause = 300;
+// Milliseconds after which it is said that an answer takes long.
+const patience = 400;
+
+/** The answer to a question, with its status if that is not 200; `signal` takes it back, which the server notices. */
 export async function ask(question, query, signal) {
-  for (;;) {
+  for (let attempt = 1; ; attempt++) {
     let answer, status;
     try {
-      const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal });
-      status = response.status;
+      const response = await fetch(`ask/${question}?${new URLSearchParams(query)}`, { signal, headers: { "x-status": "in-answer" } });
       answer = await response.json();
+      status = answer.status ?? response.status;
     } catch (trouble) {
       if (signal?.aborted) throw trouble;
       return { error: "the server does not answer: is chuteflow explore still running?" };
     }
-    if (status !== 503) return answer;
-    await new Promise((wake) => { setTimeout(wake, 300); });
+    if (status === 200) return answer;
+    if (status !== 503 || attempt === attempts) return { ...answer, status };
+    await new Promise((wake) => { setTimeout(wake, pause); });
+    signal?.throwIfAborted();
   }
 }
 
 /** One question of a kind is under way at a time; of those that come meanwhile, only the last is asked. */
 export class Latest {
-  constructor(question, answered) {
+  /** `waits` (whether) is told when an answer takes long, and when it is there; `answered` takes the answer. */
+  constructor(question, waits, answered) {
     this.question = question;
+    this.waits = waits;
     this.answered = answered;
     this.busy = false;
     this.next = null;
@@ -36,7 +45,10 @@ export class Latest {
     while (this.next) {
       const { query, mark } = this.next;
       this.next = null;
-      this.answered(await ask(this.question, query), query, mark);
+      const late = setTimeout(() => this.waits(true), patience), answer = await ask(this.question, query);
+      clearTimeout(late);
+      this.waits(false);
+      this.answered(answer, query, mark);
     }
     this.busy = false;
   }

@@ -3,6 +3,7 @@ import { escaped, sizeOf } from "./page.js";
 
 /** A number with so many digits, without needless zeros. */
 export function number(value, digits = 4) {
+  if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) return value.toExponential(Math.max(0, digits - 2)).replace("e+", "e");
@@ -22,6 +23,13 @@ function logTicks(low, high, room) {
   }
   if (parts.length < 2) return null;
   return parts.length > room ? parts.filter((_, i) => i % Math.ceil(parts.length / room) === 0) : parts;
+}
+
+/** The axis as it is, or one that can be drawn in place of one without an extent. */
+function sound(axis) {
+  const { low, high, log } = axis;
+  const possible = Number.isFinite(low) && Number.isFinite(high) && high - low > 1e-9 * Math.abs(high) && !(log && low <= 0);
+  return possible ? axis : { ...axis, low: 1, high: 10 };
 }
 
 function ticks({ low, high, log }, room) {
@@ -45,7 +53,15 @@ function scale({ low, high, log }, from, to) {
   return at;
 }
 
-const path = (points, sx, sy) => points.map(([a, b], i) => `${i ? "L" : "M"}${sx(a).toFixed(1)} ${sy(b).toFixed(1)}`).join("");
+const known = ([a, b]) => Number.isFinite(a) && Number.isFinite(b);
+
+function path(points, sx, sy) {
+  const placed = points.map(([a, b]) => [sx(a), sy(b)]).filter(known);
+  return placed.map(([a, b], i) => `${i ? "L" : "M"}${a.toFixed(1)} ${b.toFixed(1)}`).join("");
+}
+
+/** A label as markup of SVG: what follows "_" is set lower. */
+const lowered = (label) => escaped(label).replace(/_(\w+)(.*)/, '<tspan dy="3" font-size="9">$1</tspan><tspan dy="-3">$2</tspan>');
 
 const shapes = {
   circle: (x, y) => `<circle class="special" cx="${x}" cy="${y}" r="4.5">`,
@@ -66,18 +82,19 @@ function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
     if (!y.bare) out.push(`<text x="${l - 5}" y="${Number(p) + 4}" text-anchor="end">${number(v, 3)}</text>`);
   }
   out.push(`<path class="axis" d="M${l} ${t}V${b}H${r}"/>`);
-  out.push(`<text x="${(l + r) / 2}" y="${height - 5}" text-anchor="middle">${escaped(x.label)}</text>`);
-  if (y.label) out.push(`<text transform="translate(12 ${(t + b) / 2}) rotate(-90)" text-anchor="middle">${escaped(y.label)}</text>`);
+  out.push(`<text x="${(l + r) / 2}" y="${height - 5}" text-anchor="middle">${lowered(x.label)}</text>`);
+  if (y.label) out.push(`<text transform="translate(12 ${(t + b) / 2}) rotate(-90)" text-anchor="middle">${lowered(y.label)}</text>`);
   return out.join("");
 }
 
 /**
- * Draw into `svg`; returns the scales `sx`, `sy` and the frame `box`.
+ * Draw into `svg`, without what has no place; returns the scales `sx`, `sy` and the frame `box`.
  *
- * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}. `lines`: {points,
- * colour, dash, width}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
+ * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}, hatched without a
+ * colour. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
-export function draw(svg, { x, y, areas = [], lines = [], marks = [], hair }) {
+export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = [], hair }) {
+  const x = sound(across), y = sound(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
   // Room for the numbers, of some 6.6 pixels a digit, and for what they are of.
@@ -85,16 +102,20 @@ export function draw(svg, { x, y, areas = [], lines = [], marks = [], hair }) {
   const box = { l: Math.round(digits * 6.6) + (y.label ? 28 : 12), r: width - 10, t: 10, b: height - 36 };
   const sx = scale(x, box.l, box.r), sy = scale(y, box.b, box.t);
   const inside = [];
-  for (const { rings, colour } of areas) inside.push(`<path d="${rings.map((points) => `${path(points, sx, sy)}z`).join("")}" fill="${colour}" stroke="${colour}" stroke-width=".7"/>`);
-  for (const { points, colour, dash, width: thick = 2 } of lines) {
-    inside.push(`<path class="line" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
+  for (const { rings, colour } of areas) {
+    const paint = colour ? `fill="${colour}" stroke="${colour}"` : `class="unknown" fill="url(#${svg.id}-hatch)"`;
+    inside.push(`<path d="${rings.map((points) => `${path(points, sx, sy)}z`).join("")}" ${paint} stroke-width=".7"/>`);
   }
-  if (hair !== undefined) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
-  for (const mark of marks) {
+  for (const { points, colour, dash, width: thick = 2, beneath } of lines) {
+    inside.push(`<path class="${beneath ? "beneath" : "line"}" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
+  }
+  if (known([sx(hair), 0])) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
+  for (const mark of marks.filter((one) => known([sx(one.x), sy(one.y)]))) {
     const shape = shapes[mark.shape](Number(sx(mark.x).toFixed(1)), Number(sy(mark.y).toFixed(1)), mark);
     inside.push(`${shape}<title>${escaped(mark.title)}</title>${shape.startsWith("<path") ? "</path>" : "</circle>"}`);
   }
-  svg.innerHTML = `<clipPath id="${svg.id}-clip"><rect x="${box.l - 8}" y="${box.t - 8}" width="${Math.max(0, box.r - box.l + 16)}" height="${box.b - box.t + 8}"/></clipPath>
+  svg.innerHTML = `<pattern id="${svg.id}-hatch" class="hatch" width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M3 0V7"/></pattern>
+    <clipPath id="${svg.id}-clip"><rect x="${box.l - 8}" y="${box.t - 8}" width="${Math.max(0, box.r - box.l + 16)}" height="${box.b - box.t + 8}"/></clipPath>
     ${axes(x, y, sx, sy, box, height, levels)}<g clip-path="url(#${svg.id}-clip)">${inside.join("")}</g>`;
   return { sx, sy, box };
 }

@@ -1,6 +1,6 @@
 // Sliders, number fields and lists: what one sets.
 import { number } from "./chart.js";
-import { byId, escaped } from "./page.js";
+import { byId, escaped, tell } from "./page.js";
 import { state } from "./state.js";
 import { factor, unit } from "./units.js";
 
@@ -8,8 +8,11 @@ const steps = 1000;
 const controls = {};
 let set = null, choices = {};
 
-const position = ({ low, high, logarithmic }, value) =>
-  (logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)) * steps;
+/** The place of a slider that is nearest to a value. */
+function position({ low, high, logarithmic }, value) {
+  const within = Math.min(high, Math.max(low, value));
+  return Math.round((logarithmic ? Math.log(within / low) / Math.log(high / low) : (within - low) / (high - low)) * steps);
+}
 const valueAt = ({ low, high, logarithmic }, place) =>
   logarithmic ? low * (high / low) ** (place / steps) : low + ((high - low) * place) / steps;
 const symbol = (text) => escaped(text).replace(/_(.)/, "<sub>$1</sub>");
@@ -28,9 +31,8 @@ export function makeControls(about, setter) {
     if (event.target.value !== "") set({ ...about.presets[event.target.value].state, flow: 0 }, event);
     event.target.value = "";
   });
-  for (const name of ["d", "rho"]) byId(name).addEventListener("change", (event) => {
-    if (Number(event.target.value) > 0) set({ [name]: event.target.value }, event); else showControls();
-  });
+  takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
+  takeTyped("rho", "density of the grains", (typed) => (typed > 0 ? { rho: typed } : null), "a number above 0");
   for (const name of ["theme", "against"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
   for (const name of ["si", "whole"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
 }
@@ -43,6 +45,21 @@ function addControl(markup) {
   return box;
 }
 
+/**
+ * Take a number that is typed into a field: `parts` (number) gives the changes of the state, or null for what cannot
+ * be drawn. Then, and where no number is typed, the field shows what holds, and the page says why. Whether there is
+ * such a chute is for the server to say.
+ */
+function takeTyped(id, what, parts, wanted) {
+  byId(id).addEventListener("change", (event) => {
+    const text = event.target.value, typed = Number(text), taken = text === "" || !Number.isFinite(typed) ? null : parts(typed);
+    if (taken) { set(taken, event); showControls(); return; }
+    const given = event.target.validity.badInput ? "what was typed is no number" : text === "" ? "nothing was typed" : `${text} was typed`;
+    showControls();
+    tell("typed", `The ${what} must be ${wanted}: ${given}, and ${event.target.value} stays.`);
+  });
+}
+
 function makeSlider(name, control) {
   const angle = `<div class="line"><label for="angle">or angle <i>θ</i></label>
     <input type="number" id="angle" step="any" aria-describedby="${name}-meaning"><span class="unit">°</span></div>`;
@@ -53,14 +70,8 @@ function makeSlider(name, control) {
   controls[name] = control;
   byId(`${name}-slider`).addEventListener("input", (event) =>
     set({ [name]: Number(valueAt(control, Number(event.target.value)).toPrecision(4)) }, event));
-  byId(name).addEventListener("change", (event) => {
-    const typed = Number(event.target.value) / factorOf(name);
-    if (event.target.value !== "" && Number.isFinite(typed)) set({ [name]: typed }, event); else showControls();
-  });
-  if (name === "slope") byId("angle").addEventListener("change", (event) => {
-    const slope = Math.tan((Number(event.target.value) * Math.PI) / 180);
-    if (event.target.value !== "" && Number.isFinite(slope)) set({ slope }, event); else showControls();
-  });
+  takeTyped(name, control.label.toLowerCase(), (typed) => ({ [name]: typed / factorOf(name) }), "a number");
+  if (name === "slope") takeTyped("angle", "angle", (typed) => (typed > 0 && typed < 90 ? { slope: Math.tan((typed * Math.PI) / 180) } : null), "above 0 and below 90 degrees");
 }
 
 function makeChoice(name, { label, options, meaning }) {
@@ -70,21 +81,32 @@ function makeChoice(name, { label, options, meaning }) {
   byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
 }
 
-/** Show the state in every control. */
+/** Text of a number for a field, or of nothing where there is none. */
+const fieldText = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "");
+
+/** Show the state in every control; what was said of typed text is over. */
 export function showControls() {
+  tell("typed", "");
   for (const [name, control] of Object.entries(controls)) {
     const value = Number(state[name]), shown = value * factorOf(name), field = byId(name), slider = byId(`${name}-slider`);
     const units = name === "Q" ? unit("Q") : "";
-    field.value = String(Number(shown.toPrecision(6)));
+    field.value = fieldText(shown);
     slider.value = String(position(control, value));
     slider.setAttribute("aria-valuetext", `${number(shown)} ${units}`.trim());
     byId(`${name}-unit`).textContent = units || "–";
     byId(`${name}-unit`).title = units ? "" : "dimensionless";
   }
-  byId("angle").value = String(Number(degrees(Number(state.slope)).toPrecision(6)));
-  for (const name of [...Object.keys(choices), "d", "rho", "theme", "against"]) byId(name).value = state[name];
+  byId("angle").value = fieldText(degrees(Number(state.slope)));
+  for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
+  for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
   for (const name of ["si", "whole"]) byId(name).checked = Boolean(state[name]);
   byId("grains").hidden = !state.si;
+}
+
+/** The flux, or NaN where the state has none that can be. */
+export function flux() {
+  const Q = Number(state.Q);
+  return Q >= controls.Q.low && Q <= controls.Q.high ? Q : NaN;
 }
 
 /** A flux within the range of its slider. */

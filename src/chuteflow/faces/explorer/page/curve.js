@@ -1,12 +1,16 @@
 // The curve of all flows, folds and all: flows at the flux as points to choose, and the curve itself to drag.
 import { draw } from "./chart.js";
-import { fluxWithin } from "./controls.js";
-import { byId, colour, flowColour } from "./page.js";
+import { flux, fluxWithin } from "./controls.js";
+import { byId, colour, flowColour, sentence } from "./page.js";
 import { change, state } from "./state.js";
 import { factor, labelled } from "./units.js";
 
 const svg = byId("curve");
-const names = { h: "centre of mass h", M: "hold-up M", T_surface: "surface temperature" };
+/** What the curve is drawn against; the surface temperature is one thing on the half-line and another beneath an interface. */
+const nameOf = (quantity) => ({
+  h: "centre of mass h", M: "hold-up M",
+  T_surface: state.surface === "interface" ? "T_surface, at the interface" : "T_surface, far above",
+})[quantity];
 const shapes = { "fold-Q": "circle", "fold-M": "circle", "fold-T": "circle", "density-inversion": "diamond", "interior-change": "triangle" };
 let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null;
 // While the curve is dragged: ln of the quantity where the pointer is.
@@ -15,8 +19,9 @@ let held = null;
 /** `setter` (parts, event) changes the state. */
 export function begin(setter) { set = setter; }
 
+/** The curve, or why it is left out. */
 export function takeCurve(answer) {
-  curve = answer;
+  curve = answer.error ? { branches: [], says: "", why: answer.error } : answer;
   byId("count").textContent = curve.says;
   redraw();
 }
@@ -30,11 +35,12 @@ export function takeFlows(list, k) {
 
 /** Part of the curve that holds its folds and the flux, or all of it. */
 function wanted() {
-  const Q = Number(state.Q), name = state.against;
+  const Q = flux(), name = state.against;
   const all = curve.branches.flatMap((b) => b.Q.map((q, i) => [q, b[name][i]]));
   if (!all.length) return null;
   const folds = curve.branches.flatMap((b) => b.special.filter((s) => s.kind === "fold-Q").map((s) => s.Q));
-  const ends = state.whole ? all.map(([q]) => q) : [...folds.map((q) => q / 2.5), ...folds.map((q) => q * 2.5), Q / 2, Q * 2];
+  const ends = state.whole ? all.map(([q]) => q) : [...folds.map((q) => q / 2.5), ...folds.map((q) => q * 2.5), ...(Q > 0 ? [Q / 2, Q * 2] : [])];
+  if (!ends.length) ends.push(...all.map(([q]) => q));
   const x = { low: Math.min(...ends), high: Math.max(...ends), log: true };
   const inside = all.filter(([q]) => q >= x.low && q <= x.high), ys = (inside.length ? inside : all).map((p) => p[1]);
   return { x, y: { low: Math.min(...ys) * 0.9, high: Math.max(...ys) * 1.1, log: true }, name, whole: state.whole };
@@ -47,43 +53,50 @@ function settle() {
   const span = (axis) => Math.log(axis.high / axis.low);
   const serves = (axis) => next[axis].low >= frame[axis].low && next[axis].high <= frame[axis].high && span(frame[axis]) < 1.6 * span(next[axis]);
   const same = frame && frame.name === next.name && frame.whole === next.whole;
-  const dragged = same && held !== null && Number(state.Q) >= frame.x.low && Number(state.Q) <= frame.x.high;
+  const dragged = same && held !== null && flux() >= frame.x.low && flux() <= frame.x.high;
   if (!(dragged || (same && serves("x") && serves("y")))) frame = next;
 }
 
-/** Lines of a branch: one for each stretch whose density is of one kind. */
-function stretches(branch, at) {
-  const lines = [];
+/** Stretches of a branch, as its first and last point, along which `kind` (point) stays the same. */
+function* stretches(branch, kind) {
   for (let i = 0; i < branch.Q.length - 1;) {
     let j = i + 1;
-    while (j < branch.Q.length - 1 && branch.density[j] === branch.density[i]) j++;
-    const points = [];
-    for (let k = i; k <= j; k++) points.push(at(k));
-    lines.push({ points, colour: colour("--curve"), dash: branch.density[i] === "monotonic" ? "7 4" : "" });
+    while (j < branch.Q.length - 1 && kind(j) === kind(i)) j++;
+    yield [i, j];
     i = j;
   }
-  return lines;
+}
+
+/** Lines of a branch: by the kind of density, over a band where the flows are beyond the theory. */
+function linesOf(branch, at) {
+  const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(branch.validity?.words[i]?.length);
+  const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true }));
+  const dash = ([i]) => (branch.density[i] === "monotonic" ? "7 4" : "");
+  return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends) }))];
 }
 
 export function redraw() {
   if (!curve) return;
   settle();
   if (!frame) {
-    svg.innerHTML = `<text x="12" y="30">No curve: this chute has no flows.</text>`;
+    svg.innerHTML = "";
+    byId("curve-words").textContent = curve.why ? sentence(curve.why) : "No curve: this chute has no flows in the range searched.";
     shown = null;
     return;
   }
+  byId("curve-words").textContent = "";
   const name = state.against, sq = factor("Q"), sn = factor(name), lines = [], marks = [];
   const axis = ({ low, high, log }, s, label) => ({ low: low * s, high: high * s, log, label });
   for (const branch of curve.branches) {
-    lines.push(...stretches(branch, (i) => [branch.Q[i] * sq, branch[name][i] * sn]));
+    lines.push(...linesOf(branch, (i) => [branch.Q[i] * sq, branch[name][i] * sn]));
     for (const s of branch.special) marks.push({ x: s.Q * sq, y: s[name] * sn, shape: shapes[s.kind] ?? "circle", title: curve.kinds[s.kind] ?? s.kind });
   }
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
   shown = draw(svg, {
-    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(names[name], name)), lines, marks, hair: Number(state.Q) * sq,
+    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), lines, marks, hair: flux() * sq,
   });
-  svg.setAttribute("aria-valuenow", String(Number(state.Q) * sq));
+  byId("beyond").hidden = !lines.some((line) => line.beneath);
+  svg.setAttribute("aria-valuenow", String(fluxWithin(Number(state.Q) || 0) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
   svg.setAttribute("aria-valuemax", String(frame.x.high * sq));
 }
@@ -134,5 +147,5 @@ svg.addEventListener("keydown", (event) => {
   const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
   if (!turn) return;
   event.preventDefault();
-  set({ Q: fluxWithin(Number(state.Q) * 1.01 ** turn) }, event);
+  set({ Q: fluxWithin((Number(state.Q) || 0) * 1.01 ** turn) }, event);
 });

@@ -5,7 +5,7 @@ import { makeControls, showControls } from "./controls.js";
 import * as curve from "./curve.js";
 import * as chutePicture from "./grains.js";
 import * as map from "./map.js";
-import { byId, escaped, flowColour, forgetColours } from "./page.js";
+import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
 import { address, change, chute, grains, ofChute, ofLooks, onChange, start, state, write } from "./state.js";
@@ -27,27 +27,30 @@ function set(parts, event) {
 
 // --- answers ----------------------------------------------------------------------------------------------------
 
+/** Whether a panel waits for an answer, said after a while. */
+const waits = (panel) => (waiting) => byId(panel).setAttribute("aria-busy", String(waiting));
+
 const asks = {
-  flows: new Latest("flows", (answer, query, since) => take(answer, "flows", since, () => {
-    flows = answer;
+  flows: new Latest("flows", waits("words"), (answer, query, since) => take(answer, "flows", since, () => {
+    flows = answer.error ? { ...answer, top: 1, says: sentence(answer.error) } : answer;
     const held = curve.heldFlow(flows.flows);
     if (held !== null) change({ flow: held });
     stability.restart(flows.flows.length);
     showFlows();
   })),
-  curve: new Latest("curve", (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
+  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
 };
 
-const failures = {};
+const refused = {};
 
 /** Use an answer, or say what went wrong and that the panels are not of what the controls say. */
 function take(answer, name, since, use) {
-  failures[name] = answer.error ?? "";
-  const failure = Object.values(failures).find(Boolean) ?? "";
-  byId("failure").hidden = !failure;
-  byId("failure").textContent = failure && `${failure}.${flows ? " What is shown below is of before." : ""}`;
-  document.querySelector("main").classList.toggle("of-before", Boolean(failure));
-  if (answer.error) return;
+  // What is left out is said in its panel, which shows then nothing that is of before.
+  const leftOut = answer.status === 422;
+  refused[name] = Boolean(answer.error) && !leftOut;
+  tell(name, refused[name] ? `${answer.error.replace(/\.$/, "")}.${flows ? " What is shown below is of before." : ""}` : "");
+  document.querySelector("main").classList.toggle("of-before", Object.values(refused).includes(true));
+  if (refused[name]) return;
   use();
   measured(name, since);
 }
@@ -83,11 +86,12 @@ onChange((has) => {
 
 // --- flows --------------------------------------------------------------------------------------------------------
 
-const shown = (symbol, value) => `${symbol.replace("_surface", "")} ${number(value * factor(symbol))}${unit(symbol) ? ` ${unit(symbol)}` : ""}`;
+const beyond = (flow) => (flow.validity?.words.length ? `<span class="beyond">${escaped(flow.validity.words.join(", "))}</span>` : "");
+const shown = (symbol, value) => `${symbol.replace(/_(.*)/, "<sub>$1</sub>")} ${number(value * factor(symbol))}${unit(symbol) ? ` ${unit(symbol)}` : ""}`;
 
 const row = (flow, i) => `<label><input type="radio" name="flow" value="${i}"${i === chosen() ? " checked" : ""}>
   <svg class="swatch" viewBox="0 0 2 2" aria-hidden="true"><circle cx="1" cy="1" r="1" fill="${flowColour(i)}"/></svg>
-  <span><b>${escaped(flow.name)}</b> <span class="numbers">${["h", "M", "T_surface"].map((symbol) => shown(symbol, flow[symbol])).join(" · ")} · error ${flow.error.toExponential(0)}</span>
+  <span><b>${escaped(flow.name)}</b> ${beyond(flow)} <span class="numbers">${["h", "M", "T_surface"].map((symbol) => shown(symbol, flow[symbol])).join(" · ")} · error ${flow.error.toExponential(0)}</span>
   <span class="quiet">${escaped(flow.kinds)}; <span class="stability"></span></span></span></label>`;
 
 /** All panels that show the flows at the flux. */
@@ -107,7 +111,7 @@ function showFlows() {
 /** Panels of the chosen flow alone, and how to compute it. */
 function showRest() {
   const flow = flows.flows[chosen()] ?? null;
-  chutePicture.show(flow, Number(flows.chute.slope), flowColour(chosen()));
+  chutePicture.show(flow, flows.chute.slope, flowColour(chosen()));
   drawBudget(flow, chosen());
   byId("command").textContent = flows.recipes.command;
   byId("python").textContent = flows.recipes.python;

@@ -1,7 +1,7 @@
 // The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair to drag.
 import { ask, AtRest } from "./ask.js";
 import { draw } from "./chart.js";
-import { byId, colour } from "./page.js";
+import { byId, colour, sentence } from "./page.js";
 import { chute, state } from "./state.js";
 
 const svg = byId("map"), key = byId("map-key"), selects = { x: byId("map-x"), y: byId("map-y") };
@@ -16,8 +16,12 @@ const shadings = {
   density: { label: "density", says: "Densities among the flows", value: (bits) => bits, name: (bits) => ["no flow", "monotonic", "inverted", "both"][bits] },
   interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
 };
-// Columns to begin with, and how narrow the stretches between columns may become.
-const first = 8, finest = 64;
+// Columns to begin with, and how narrow the stretches between columns may become, or those beside an unknown one.
+const first = 8, finest = 64, finestUnknown = 16;
+// What is not known of a column has a value of its own, which is hatched.
+const unknown = -1;
+// Places near which a column is looked at closely, at most.
+const mostNear = 32;
 let about = null, set = null, failure = "", shown = null, holding = false;
 // What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
 let wanted = {}, columns = [], whole = false, drawn = null;
@@ -54,13 +58,19 @@ const asking = new AtRest(150, async (signal) => {
   const query = { ...Object.fromEntries(held), x, y };
   const known = JSON.stringify(query) === JSON.stringify(wanted) ? columns : [];
   let places = known.length ? narrower(known) : Array.from({ length: first + 1 }, (_, i) => i / first);
+  failure = "";
   while (places.length) {
     for (const place of places) {
-      const column = await ask("map", { ...query, place }, signal);
+      const column = await ask("map", { ...query, place, near: near(known, place) }, signal);
       signal.throwIfAborted();
-      failure = column.error ?? "";
-      if (failure) { redraw(); return; }
-      known.push({ ...column, place });
+      if (column.error && column.status !== 422) {
+        // What is wrong with the chute is said above.
+        failure = column.status === 400 ? "No map of this chute." : sentence(column.error);
+        [wanted, columns, drawn] = [{}, [], null];
+        redraw();
+        return;
+      }
+      known.push({ ...(column.error ? withoutAnswer(query, place) : column), place });
       known.sort((a, b) => a.place - b.place);
       if (known.length > first) take(query, known, false);
     }
@@ -77,8 +87,23 @@ function take(query, found, all) {
   redraw();
 }
 
+/** A column of which nothing is known. Columns run along a parameter of the base, if there is one. */
+function withoutAnswer({ x, y }, place) {
+  const ofBase = (name) => name === "ew" || name === "roughness";
+  const [outer, inner] = ofBase(x) && !ofBase(y) ? [y, x] : [x, y], { low, high } = about.controls[outer];
+  return { outer, inner, at: low + place * (high - low), parts: null };
+}
+
+/** Where the columns to either side of a place change: there a new one is looked at closely. */
+function near(found, place) {
+  const left = found.findLast((column) => column.place < place), right = found.find((column) => column.place > place);
+  const stops = [left, right].flatMap((column) => Object.values(column?.parts ?? {}).flatMap((part) => part.stops));
+  return [...new Set(stops.map((stop) => stop.toPrecision(4)))].slice(0, mostNear).join(",");
+}
+
 /** What of a column is shaded. */
 function shaded({ parts }) {
+  if (!parts) return { stops: [], values: [unknown] };
   const { stops, values } = parts[state.shade], told = values.map(shadings[state.shade].value);
   const kept = stops.map((_, i) => i).filter((i) => told[i] !== told[i + 1]);
   return { stops: kept.map((i) => stops[i]), values: [told[0], ...kept.map((i) => told[i + 1])] };
@@ -86,18 +111,40 @@ function shaded({ parts }) {
 
 const alike = (a, b) => String(a.values) === String(b.values);
 
-/** Where the stops of two columns are half-way between them: those that correspond, from either end, meet there. */
-function middles(a, b) {
-  const [n, m] = [a.stops.length, b.stops.length], ends = [[...a.stops], [...b.stops]];
-  const meet = (i, j) => { ends[0][i] = ends[1][j] = (a.stops[i] + b.stops[j]) / 2; };
-  const same = (i, j) => a.values[i] === b.values[j] && a.values[i + 1] === b.values[j + 1];
-  let low = 0, high = 0;
-  while (low < Math.min(n, m) && same(low, low)) { meet(low, low); low++; }
-  while (high < Math.min(n, m) - low && same(n - high - 1, m - high - 1)) { high++; meet(n - high, m - high); }
-  // The others stay where they are, as far as those that meet let them.
-  for (const stops of ends) for (let k = low; k < stops.length - high; k++) {
-    if (low) stops[k] = Math.max(stops[k], stops[low - 1]);
-    if (high) stops[k] = Math.min(stops[k], stops[stops.length - high]);
+/** How well two stops correspond, given how far apart they are as a share of the column: better the more of the values to their sides agree. */
+function likeness(a, i, b, j, apart) {
+  const agree = Number(a.values[i] === b.values[j]) + Number(a.values[i + 1] === b.values[j + 1]);
+  return [0.2 - 4 * apart, 0.6 - 3 * apart, 1 - 0.9 * apart][agree];
+}
+
+/** The stops of two columns that correspond, as pairs of their numbers in order: those that are the most alike in all. */
+function corresponding(a, b, span) {
+  const [n, m] = [a.stops.length, b.stops.length], best = Array.from({ length: n + 1 }, () => Array.from({ length: m + 1 }, () => ({ score: 0, pairs: [] })));
+  for (let i = n - 1; i >= 0; i--) for (let j = m - 1; j >= 0; j--) {
+    const next = best[i + 1][j + 1], paired = { score: next.score + likeness(a, i, b, j, Math.abs(a.stops[i] - b.stops[j]) / span), pairs: [[i, j], ...next.pairs] };
+    best[i][j] = [best[i + 1][j], best[i][j + 1], paired].reduce((one, two) => (two.score > one.score ? two : one));
+  }
+  return best[0][0].pairs;
+}
+
+/**
+ * Where the stops of two columns are half-way between them. Those that correspond meet half-way; a band that only
+ * one column has ends there in a point, and what begins or ends at a side of the map does so at that side.
+ */
+function middles(a, b, low, high) {
+  const pairs = corresponding(a, b, high - low), ends = [[...a.stops], [...b.stops]], meet = ([i, j]) => (a.stops[i] + b.stops[j]) / 2;
+  const differs = { first: a.values[0] !== b.values[0], last: a.values.at(-1) !== b.values.at(-1) };
+  let before = [-1, -1], least = low;
+  for (const pair of [...pairs, [a.stops.length, b.stops.length]]) {
+    const final = pair[0] === a.stops.length, most = final ? high : meet(pair), between = [0, 1].map((k) => [before[k] + 1, pair[k]]);
+    const alone = [a, b].flatMap(({ stops }, k) => stops.slice(...between[k]));
+    const [opens, closes] = [before[0] < 0 && differs.first, final && differs.last];
+    if (alone.length && !(opens && closes)) {
+      const mean = alone.reduce((sum, stop) => sum + stop, 0) / alone.length, point = opens ? low : closes ? high : Math.min(most, Math.max(least, mean));
+      for (const k of [0, 1]) ends[k].fill(point, ...between[k]);
+    }
+    if (!final) [0, 1].forEach((k) => { ends[k][pair[k]] = most; });
+    [before, least] = [pair, most];
   }
   return ends;
 }
@@ -107,16 +154,17 @@ function narrower(found) {
   const seen = found.map(shaded), places = [];
   for (let i = 1; i < found.length; i++) {
     const width = found[i].place - found[i - 1].place, follows = alike(seen[i - 1], seen[i]);
-    if (width > 1.5 / finest && (!follows || (width > 1.5 / (4 * first) && seen[i].stops.length))) places.push((found[i - 1].place + found[i].place) / 2);
+    const narrowest = seen[i - 1].values.includes(unknown) || seen[i].values.includes(unknown) ? finestUnknown : finest;
+    if (width > 1.5 / narrowest && (!follows || (width > 1.5 / (4 * first) && seen[i].stops.length))) places.push((found[i - 1].place + found[i].place) / 2);
   }
   return places;
 }
 
 /** For each two halves of a stretch between columns: where they begin and end, and stops and values there. */
-function* halves(found, part) {
+function* halves(found, part, low, high) {
   for (let i = 1; i < found.length; i++) {
     const [a, b] = [part(found[i - 1]), part(found[i])], [from, to] = [found[i - 1].at, found[i].at], middle = (from + to) / 2;
-    const [left, right] = middles(a, b);
+    const [left, right] = middles(a, b, low, high);
     yield [from, middle, a.stops, left, a.values];
     yield [middle, to, right, b.stops, b.values];
   }
@@ -126,18 +174,34 @@ function* halves(found, part) {
 function pieces(found, x) {
   const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
   const at = (o, i) => (outer === x ? [o, i] : [i, o]);
-  for (const [from, to, start, end, values] of halves(found, shaded)) values.forEach((value, k) => {
-    if (!areas.has(value)) areas.set(value, []);
-    const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
-    areas.get(value).push([at(from, p[0]), at(to, q[0]), at(to, q[1]), at(from, p[1])]);
-  });
-  for (const [from, to, start, end] of halves(found, (column) => column.parts.hot)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
+  let open = [];
+  for (const [from, to, start, end, values] of halves(found, shaded, low, high)) {
+    const before = open;
+    open = [];
+    values.forEach((value, k) => {
+      const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
+      if (p[0] === p[1] && q[0] === q[1]) return;
+      // What goes on from one half to the next is one area, without a seam.
+      let area = before.find((one) => one.value === value && one.ends[0] === p[0] && one.ends[1] === p[1]);
+      if (!area) {
+        area = { value, down: [at(from, p[0])], up: [at(from, p[1])] };
+        areas.set(value, [...(areas.get(value) ?? []), area]);
+      }
+      area.down.push(at(to, q[0]));
+      area.up.push(at(to, q[1]));
+      open.push(Object.assign(area, { ends: q }));
+    });
+  }
+  for (const [value, those] of areas) areas.set(value, those.map(({ down, up }) => [...down, ...up.reverse()]));
+  for (const [from, to, start, end] of halves(found, ({ parts }) => parts?.hot ?? { stops: [], values: [unknown] }, low, high)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
   return { areas, lines };
 }
 
 /** Only the cross-hair moves while it is dragged; the map stays. */
 function placeHair() {
-  const { sx, sy, box } = shown, x = sx(Number(state[state.x])).toFixed(1), y = sy(Number(state[state.y])).toFixed(1);
+  const { sx, sy, box } = shown, places = [sx(Number(state[state.x])), sy(Number(state[state.y]))];
+  const inside = places.every((place) => Math.abs(place) < 1e5), [x, y] = (inside ? places : [0, 0]).map((place) => place.toFixed(1));
+  for (const id of ["map-hair", "map-here"]) byId(id).style.display = inside ? "" : "none";
   byId("map-hair").setAttribute("d", `M${x} ${box.t}V${box.b}M${box.l} ${y}H${box.r}`);
   for (const [name, value] of [["cx", x], ["cy", y]]) byId("map-here").setAttribute(name, value);
   const [across, up] = [state.x, state.y].map((name) => `${about.controls[name].label} ${state[name]}`);
@@ -150,21 +214,22 @@ export function redraw() {
   if (current) drawn ??= pieces(columns, state.x);
   const axis = (name) => {
     const { low, high, label, symbol } = about.controls[name];
-    return { low, high, label: `${label.toLowerCase()} ${symbol.replace("_w", "w")}` };
+    return { low, high, label: `${label.toLowerCase()} ${symbol}` };
   };
   const { says, name } = shadings[state.shade], values = current ? [...drawn.areas.keys()].sort((a, b) => a - b) : [];
-  const shade = (value) => colour(`--map${Math.min(values.indexOf(value), 7)}`);
+  const told = values.filter((value) => value !== unknown), shade = (value) => colour(`--map${Math.min(told.indexOf(value), 7)}`);
   shown = draw(svg, {
     x: axis(state.x), y: axis(state.y),
-    areas: values.map((value) => ({ rings: drawn.areas.get(value), colour: shade(value) })),
+    areas: values.map((value) => ({ rings: drawn.areas.get(value), colour: value === unknown ? "" : shade(value) })),
     lines: current ? drawn.lines.map((points) => ({ points, colour: colour("--curve") })) : [],
   });
   svg.classList.toggle("waiting", !current || !whole);
   svg.insertAdjacentHTML("beforeend", `<path id="map-hair" class="hair"/><circle id="map-here" class="special" r="4.5"><title>this chute</title></circle>`);
-  const legend = values.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
-  key.innerHTML = current ? `${says}: ${legend.join(" ")}. Line: on one side of it there are flows at every high temperature. Drag the cross-hair to another chute.` : "";
+  const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
+  key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
   key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
+  svg.classList.toggle("failed", Boolean(failure));
 }
 
 function move(event) {
@@ -182,6 +247,6 @@ svg.addEventListener("keydown", (event) => {
   const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[event.key];
   if (!turn) return;
   event.preventDefault();
-  const name = state[turn[0]], { low, high } = about.controls[name], value = Number(state[name]) + (turn[1] * (high - low)) / 200;
+  const name = state[turn[0]], { low, high } = about.controls[name], value = (Number(state[name]) || low) + (turn[1] * (high - low)) / 200;
   set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) }, event);
 });

@@ -4,6 +4,20 @@ export const byId = (id) => document.getElementById(id);
 
 export const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
+/** A sentence of what the server says: it begins large and ends with a full stop. */
+export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`;
+
+// What the server says comes before what is said of typed text, which then has changed nothing.
+const told = { flows: "", curve: "", typed: "" };
+
+/** Say on the one line for it what is wrong, by where that comes from, or with an empty text that it no longer is. */
+export function tell(from, text) {
+  told[from] = text;
+  const first = Object.values(told).find(Boolean) ?? "", line = byId("failure");
+  line.hidden = !first;
+  if (line.textContent !== first) line.textContent = first;
+}
+
 const sizes = new WeakMap();
 const watcher = new ResizeObserver((entries) => {
   for (const { target, contentRect } of entries) sizes.set(target, contentRect);

@@ -1,6 +1,6 @@
 // Profiles of all flows over height, and the budget of fluctuation energy of the chosen one.
 import { draw } from "./chart.js";
-import { byId, flowColour, sizeOf } from "./page.js";
+import { byId, colour, flowColour, sizeOf } from "./page.js";
 import { factor, labelled, unit } from "./units.js";
 
 const panels = [["nu", "volume fraction", "ν"], ["T", "granular temperature", "T"], ["u", "velocity", "u"]];
@@ -11,17 +11,21 @@ const dashes = ["", "7 4", "2 3"];
 export function drawProfiles(list, top, chosen) {
   const sz = factor("z");
   for (const [symbol, words, letter] of panels) {
-    const svg = byId(`profile-${symbol}`), s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
+    const svg = byId(`profile-${symbol}`);
+    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows`);
+    if (!list.length) { svg.innerHTML = ""; continue; }
+    const s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
     const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
-    const largest = list.length ? Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s : 1;
+    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s;
     draw(svg, {
       x: { low: 0, high: largest * 1.05, label },
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
-      lines: list.map((flow, i) => ({
-        points: flow.profile.z.map((z, n) => [flow.profile[symbol][n] * s, z * sz]), colour: flowColour(i), width: i === chosen ? 3.4 : 2,
-      })),
+      lines: list.flatMap((flow, i) => {
+        const points = flow.profile.z.map((z, n) => [flow.profile[symbol][n] * s, z * sz]);
+        const band = flow.validity?.words.length ? [{ points, colour: colour("--beyond"), width: 9, beneath: true }] : [];
+        return [...band, { points, colour: flowColour(i), width: i === chosen ? 3.4 : 2 }];
+      }),
     });
-    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows`);
   }
 }
 

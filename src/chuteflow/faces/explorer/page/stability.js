@@ -3,7 +3,7 @@ import { ask, AtRest } from "./ask.js";
 import { byId, escaped } from "./page.js";
 import { chute, grains, state } from "./state.js";
 
-let verdicts = [], count = 0;
+let verdicts = [], count = 0, looking = false;
 
 const asking = new AtRest(400, async (signal) => {
   const query = { ...chute(), Q: state.Q, ...grains() }, chosen = Math.min(Number(state.flow) || 0, count - 1);
@@ -14,15 +14,21 @@ const asking = new AtRest(400, async (signal) => {
     verdicts[flow] = answer.error ? { state: "unknown", says: `not known whether it is stable: ${answer.error}` } : answer;
     show();
   }
+  looking = false;
 });
 
 /** Other flows are wanted: what is asked about those before is taken back. */
-export const stop = () => asking.stop();
+export function stop() {
+  asking.stop();
+  looking = false;
+  show();
+}
 
 /** Other flows are there: `number` of them. */
 export function restart(number) {
   verdicts = [];
   count = number;
+  looking = count > 0;
   if (count) asking.begin();
 }
 
@@ -30,7 +36,7 @@ export function restart(number) {
 export function show() {
   byId("flows").querySelectorAll(".stability").forEach((place, i) => {
     const known = verdicts[i];
-    place.innerHTML = known ? `<b>${escaped(known.says)}</b>${known.waves ? ` (${escaped(known.waves)})` : ""}` : "stability: looking for growing waves…";
+    place.innerHTML = known ? `<b>${escaped(known.says)}</b>${known.waves ? ` (${escaped(known.waves)})` : ""}` : looking ? "stability: looking for growing waves…" : "stability not looked at";
     place.dataset.state = known?.state ?? "";
   });
 }

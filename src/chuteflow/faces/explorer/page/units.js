@@ -7,7 +7,9 @@ export function setQuantities(given) { quantities = given; }
 export function factor(symbol) {
   if (!state.si) return 1;
   const [a, b, c] = quantities[symbol].dimension;
-  return Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(state.slope))) ** c;
+  const value = Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(state.slope))) ** c;
+  // An address may hold grains or a slope that cannot be, which the server then says.
+  return value > 0 && Number.isFinite(value) ? value : 1;
 }
 
 export function unit(symbol) {
