@@ -5,6 +5,7 @@ CHUTEFLOW_RANDOM_CHUTES sets the number of chutes; a chute takes some ten second
 
 import os
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,8 +112,9 @@ def test_near_folds_and_past_cusps_flows_are_those_of_a_dense_scan():
         for which, target in asked(chute, branches, random):
             if abs(target) > np.log(1e11):
                 continue
-            found = flows(chute, **{ARGUMENTS[which]: float(np.exp(target))})
+            given: dict[str, Any] = {ARGUMENTS[which]: float(np.exp(target))}
+            found = flows(chute, **given)
             inside = sum(within.contains(macroscopic(flow)) for flow in found)
-            assert inside == counted(branches, which, target), (chute, ARGUMENTS[which], float(np.exp(target)))
+            assert inside == counted(branches, which, target), (chute, given)
             questions += 1
     assert questions >= CHUTES

@@ -213,18 +213,13 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
         return found[0].flow
     within = Range.checked(kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface)
     searched = Searched((within.coldest, within.hottest), within.deepest)
-    tolerance, reason = checked_tolerance(kept["tolerance"]), kept["reason"]
-    if not (reason is None or isinstance(reason, str)):
-        raise InputError(f"reason = {shown(reason)}: must be a sentence or null")
+    tolerance, reason = checked_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
     if kind == "flows":
         flows = tuple(row.flow for row in found)
         for one, two in pairwise(flows):
             if one.surface_temperature < two.surface_temperature or _same(one, two):
                 raise InputError("its flows are not from hot to cold, each once")
-        incomplete = kept.get("incomplete")
-        if not (incomplete is None or isinstance(incomplete, str)):
-            raise InputError(f"incomplete = {shown(incomplete)}: must be a sentence or null")
-        return FlowSet(chute, flows, searched, tolerance, reason, incomplete)
+        return FlowSet(chute, flows, searched, tolerance, reason, _sentence("incomplete", kept.get("incomplete")))
     if kind != "curve":
         raise InputError(f"it holds an unknown kind of result, {shown(kind)}")
     ends = [(str(begin), str(end)) for begin, end in kept["ends"]]
@@ -232,6 +227,12 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
         raise InputError("it holds flows of a branch that is not in it")
     branches = [_branch([row for row in found if row.branch == i], at) for i, at in enumerate(ends)]
     return Curve(chute, tuple(branches), searched, tolerance, reason)
+
+
+def _sentence(name: str, value: Any) -> str | None:
+    if not (value is None or isinstance(value, str)):
+        raise InputError(f"{name} = {shown(value)}: must be a sentence or null")
+    return value
 
 
 def _same(one: Flow, two: Flow) -> bool:

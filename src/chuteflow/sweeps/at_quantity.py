@@ -313,8 +313,10 @@ def _turning(
     turns = may_turn(slope, noise)[left]
     reach = _SAG * step * np.nan_to_num(np.fmax(change[1:], change[:-1])[left]) + _NOISE
     with np.errstate(invalid="ignore"):
-        turns &= (np.minimum(off_a, off_b) <= reach) & (np.maximum(off_a, off_b) >= -reach)
-    return turns.any(axis=1)
+        near = (np.minimum(off_a, off_b) <= reach) & (np.maximum(off_a, off_b) >= -reach)
+    out = np.zeros(len(left), dtype=bool)
+    out[np.nonzero(turns & near)[0]] = True
+    return out
 
 
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
