@@ -22,6 +22,8 @@ from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_d
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
+#: Reaches over which the direction of a rough branch is looked for.
+_REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
 #: there is not known.
 _SHARP = 0.8
@@ -66,17 +68,19 @@ class Family:
         return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
 
     def _direction(self, i: int) -> Array | None:
-        """Unit vector (4,) along the branch at rough flow ``i``; None where it turns sharply there."""
+        """Unit vector (4,) along the branch at rough flow ``i``: over the shortest reach to both sides in which it
+        does not turn sharply, since rough flows scatter; None where it does in all."""
         length, m = self.arclength, self.macroscopic
-        before = max(int(np.searchsorted(length, length[i] - _TOO_NEAR, side="right")) - 1, 0)
-        after = min(int(np.searchsorted(length, length[i] + _TOO_NEAR, side="left")), len(m) - 1)
-        sides = m[i] - m[before], m[after] - m[i]
-        sizes = [float(np.linalg.norm(side)) for side in sides]
-        if min(sizes) > 0.0 and float(sides[0] @ sides[1]) < _SHARP * sizes[0] * sizes[1]:
-            return None
-        chord = m[after] - m[before]
-        size = float(np.linalg.norm(chord))
-        return chord / size if size > 0.0 else None
+        for reach in _REACHES:
+            before = max(int(np.searchsorted(length, length[i] - reach, side="right")) - 1, 0)
+            after = min(int(np.searchsorted(length, length[i] + reach, side="left")), len(m) - 1)
+            sides = m[i] - m[before], m[after] - m[i]
+            sizes = [float(np.linalg.norm(side)) for side in sides]
+            chord = sides[0] + sides[1]
+            size = float(np.linalg.norm(chord))
+            if size > 0.0 and float(sides[0] @ sides[1]) >= _SHARP * sizes[0] * sizes[1]:
+                return chord / size
+        return None
 
     def _bend(self, i: int) -> float:
         """How far the rough flow lies beside the chord of its neighbours."""
@@ -263,6 +267,9 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
             found.append(_between(Chord(one, other, tolerance), which, target))
+    seen = family.macroscopic[[begin, end], which] - target
+    if len(found) % 2 != ((seen[0] >= 0.0) != (seen[1] >= 0.0)) and not turning:
+        raise SolveError("a flow seen in the search was not found on its branch")
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution
