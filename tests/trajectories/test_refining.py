@@ -38,6 +38,18 @@ def equations(problem):
     return derivative
 
 
+class RunsOff:
+    """Ends an integration where y is larger than ``most``."""
+
+    terminal = True
+
+    def __init__(self, most):
+        self.most = most
+
+    def __call__(self, _p, state):
+        return abs(state[1]) - self.most
+
+
 def base_flux(problem, big_l):
     f, _ = problem.closures(np.exp(np.atleast_1d(big_l)))
     return problem.base_flux(f)
@@ -55,11 +67,7 @@ def test_no_trajectory_leaves_a_region(chute):
         if region == kernel.FREE or (region in seen and len(seen) == 3 and random.random() < 0.9):
             continue
         seen.add(region)
-
-        def runs_off(_p, state):
-            return abs(state[1]) - 50.0 * scale
-
-        runs_off.terminal = True
+        runs_off = RunsOff(50.0 * scale)
         path = solve_ivp(equations(problem), (p, p + 30.0), [big_l, y], events=runs_off, rtol=1e-8, atol=1e-10)
         residual = path.y[1] - base_flux(problem, path.y[0])
         assert (residual > 0.0).all() if region == kernel.HOT else (residual < 0.0).all()
@@ -80,7 +88,7 @@ def test_trajectories_are_those_of_another_integrator(chute):
         (same,) = np.nonzero(np.abs(rows[1][:, kernel.S_T] - begin[kernel.S_T]) < 1e-12)
         if len(same) != 1 or abs(begin[kernel.S_Y]) > problem.flux_scale:
             continue
-        path = solve_ivp(derivative, p, begin[:2], rtol=1e-8, atol=1e-10)
+        path = solve_ivp(derivative, (p[0], p[1]), begin[:2], rtol=1e-8, atol=1e-10)
         np.testing.assert_allclose(rows[1][same[0], :2], path.y[:, -1], rtol=1e-3, atol=5e-3)
         compared += 1
     assert compared > 2

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.analysis.paths import Chord, Point, Turn, find_value, point_at, refined, turns
 from chuteflow.analysis.ranges import CLOSED, Range
@@ -216,7 +217,7 @@ def _is_behind(point: Point, last: Point) -> bool:
     return length < _SPACING and ahead < 0.0 and alike > _SHARP
 
 
-def _runs(marked: Array, arclength: Array) -> list[tuple[int, int]]:
+def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
     """First and last places of the runs of marked ones, each with neighbours to either side."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     runs: list[tuple[int, int]] = []

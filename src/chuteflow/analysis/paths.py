@@ -272,12 +272,13 @@ def _located(
     if f_high == 0.0:
         return 1.0, chord.last
     scale = max(abs(f_low), abs(f_high))
-    sigma = f_low / (f_low - f_high)
+    sigma, point = f_low / (f_low - f_high), chord.first
     side = 0
     for _ in range(80):
-        point = chord.at(sigma)
-        if point is None:
+        reached = chord.at(sigma)
+        if reached is None:
             raise SolveError("a branch of flows could not be followed to a point on it")
+        point = reached
         f, slope = function(point)
         if abs(f) <= max(_ROUNDING, close * scale) or high - low < _CLOSE:
             return sigma, point
