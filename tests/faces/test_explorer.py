@@ -281,7 +281,10 @@ def test_exports(client, what):
     [
         ({}, "missing slope"),
         (PAPER, "missing Q"),
-        (PAPER | {"Q": "much"}, "'much': must be a number"),
+        (PAPER | {"Q": "much"}, "Q = 'much': must be a number"),
+        (PAPER | {"Q": "3", "slope": "steep"}, "slope = 'steep': must be a number"),
+        (PAPER | {"Q": "3", "ew": "nan"}, "ew = nan: must be a finite number"),
+        (PAPER | {"Q": "3", "e": ""}, "e = '': must be a number"),
         (PAPER | {"Q": "nan"}, "must be from"),
         (PAPER | {"Q": "1e300"}, "must be from"),
         (PAPER | {"Q": "3", "e": "1.2"}, "restitution e = 1.2"),
