@@ -115,7 +115,14 @@ def test_what_was_given_is_shown_on_one_line():
 
 def test_numbers_that_come_as_text():
     assert number_in("x", " 3e-1 ", 0.0, 1.0) == 0.3
-    for text, said in (("", "''"), ("three", "'three'"), ("1+2j", "'1+2j'"), ("inf", "inf"), ("nan", "nan"), ("2", "2")):
+    for text, said in (
+        ("", "''"),
+        ("three", "'three'"),
+        ("1+2j", "'1+2j'"),
+        ("inf", "inf"),
+        ("nan", "nan"),
+        ("2", "2"),
+    ):
         with pytest.raises(InputError, match=rf"^x = {re.escape(said)}: must be .*from 0 to 1$"):
             number_in("x", text, 0.0, 1.0)
 

@@ -200,7 +200,8 @@ def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeyp
 
 
 @pytest.mark.parametrize(
-    ("near", "said"), [(40 * "0.6,", "near has 40 values: give at most 32"), ("x", "near = 'x': must be a number from -1 to 2")]
+    ("near", "said"),
+    [(40 * "0.6,", "near has 40 values: give at most 32"), ("x", "near = 'x': must be a number from -1 to 2")],
 )
 def test_what_a_column_is_near_is_checked(client, near, said):
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4", "near": near}

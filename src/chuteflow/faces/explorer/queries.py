@@ -136,7 +136,9 @@ def scales(given: Query) -> Scales | None:
         return None
     if len(named) == 1:
         raise InputError(f"SI units need {' and '.join(GRAINS)}: only {named[0]} is given")
-    return Scales(number_in("diameter", given["diameter"], 1e-9, 1e3), number_in("density", given["density"], 1e-3, 1e6))
+    return Scales(
+        number_in("diameter", given["diameter"], 1e-9, 1e3), number_in("density", given["density"], 1e-3, 1e6)
+    )
 
 
 @dataclass(frozen=True)
@@ -179,4 +181,3 @@ def map_column(query: Query) -> ColumnAsked:
         raise InputError(f"near has {len(near)} values: give at most {MOST_NEAR}")
     values = tuple(number_in("near", text, -1.0, 2.0) for text in near)
     return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values)
-
