@@ -32,6 +32,9 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 NEAR, _PER_SPACING = 0.005, 0.15
 #: One flow is solved at once where the quantity changes by more than this along the branch, per length.
 _STEEP = 0.15
+#: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
+#: where it changes by more than the second along the branch, per length.
+_NEARLY, _FIXES = 0.01, 1e-3
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
 _AT_EDGE = 1e-6
 #: Points that differ by less are one.
@@ -259,8 +262,7 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
     for (_, one), (_, other) in pairwise(placed):
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
-            _, point = find_value(Chord(one, other, tolerance), which, target)
-            found.append(_polished(point, which, target, tolerance))
+            found.append(_between(Chord(one, other, tolerance), which, target))
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution
@@ -276,14 +278,17 @@ def _at_fold(near: Solution) -> Solution:
     return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 
-def _polished(point: Point, which: int, target: float, tolerance: float) -> Solution:
-    """The flow at a point whose quantity is that asked for to rounding; its error is what that may do to the others."""
-    tangent = abs(float(point.tangent[which]))
-    near = point.solution
-    if tangent > 1e-3:
-        solution = resolve(near, Condition.fix(which, float(np.exp(target))), tolerance)
-        if solution.converged and np.linalg.norm(solution.macroscopic - near.macroscopic) < 1e-5:
-            return solution
+def _between(chord: Chord, which: int, target: float) -> Solution:
+    """The flow on a chord at which a quantity takes a value: at the value itself, where that fixes it, else in the
+    plane across the branch, with an error that says what the difference may do to the other quantities."""
+    _, point = find_value(chord, which, target, _NEARLY)
+    if abs(point.tangent[which]) > _FIXES:
+        fixed = resolve(point.solution, Condition.fix(which, float(np.exp(target))), chord.tolerance)
+        moved = float(np.linalg.norm(fixed.macroscopic - point.m))
+        if fixed.converged and moved < chord.length and 0.0 <= chord.place(fixed.macroscopic) <= 1.0:
+            return fixed
+    _, point = find_value(chord, which, target, 0.0)
+    near, tangent = point.solution, abs(float(point.tangent[which]))
     error = near.error / max(tangent, float(np.sqrt(near.error)))
     return Solution(near.macroscopic, error, near.status, near.source, near.rates)
 
