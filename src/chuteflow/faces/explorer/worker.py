@@ -6,6 +6,7 @@ import math
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -215,6 +216,7 @@ class _Watch:
         self._due: tuple[int, Ended] | None = None
         # Ctrl-C is for the server alone. The same signal interrupts a computation, on every system.
         signal.signal(signal.SIGINT, self._heard)
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._unraisable
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         threading.Thread(target=self._run, daemon=True).start()
@@ -236,6 +238,11 @@ class _Watch:
     def _heard(self, *_: object) -> None:
         if self._busy.is_set() and self._due is not None and self._due[0] == self._number:
             raise _Interrupt(self._due[1])
+
+    def _unraisable(self, given: Any) -> None:
+        """An interrupt that is lost in a finaliser needs no words: another follows."""
+        if not issubclass(given.exc_type, _Interrupt):
+            self._hook(given)
 
     def _run(self) -> None:
         while self._busy.wait():
