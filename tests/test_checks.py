@@ -1,5 +1,6 @@
 """Numbers from outside: what is no real number is refused in one line, everywhere alike."""
 
+import re
 from decimal import Decimal
 from fractions import Fraction
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, Scales, boundary, curve, domain, flows
-from chuteflow.checks import number, real_array, shown, whole
+from chuteflow.checks import number, number_in, real_array, shown, whole
 from chuteflow.faces.units import in_si
 from chuteflow.stability.planes import family_map, wave_map
 
@@ -110,6 +111,28 @@ def test_what_was_given_is_shown_on_one_line():
     assert "\n" not in shown("a\nb" * 1000)
     assert len(shown("a\nb" * 1000)) < 80
     assert shown(0.5) == "0.5"
+
+
+def test_numbers_that_come_as_text():
+    assert number_in("x", " 3e-1 ", 0.0, 1.0) == 0.3
+    for text, said in (
+        ("", "''"),
+        ("three", "'three'"),
+        ("1+2j", "'1+2j'"),
+        ("inf", "inf"),
+        ("nan", "nan"),
+        ("2", "2"),
+    ):
+        with pytest.raises(InputError, match=rf"^x = {re.escape(said)}: must be .*from 0 to 1$"):
+            number_in("x", text, 0.0, 1.0)
+
+
+def test_what_cannot_be_printed_is_shown():
+    nested: list[object] = []
+    for _ in range(10_000):
+        nested = [nested]
+    assert shown(nested) == "a list"
+    assert shown([10**5000]) == "a list"
 
 
 def test_ranges_are_told():

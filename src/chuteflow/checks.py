@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_MOST_SHOWN = 60
+#: Characters of a value that a message shows.
+MOST_SHOWN = 60
 
 
 def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
@@ -44,6 +45,19 @@ def real(name: str, value: Any, allowed: str = "") -> float:
     except (TypeError, ValueError):
         pass
     raise InputError(f"{name} = {shown(value)}: must be a number{allowed}")
+
+
+def number_in(name: str, text: str, low: float = -math.inf, high: float = math.inf) -> float:
+    """The finite number from ``low`` to ``high`` that ``text`` spells.
+
+    Raises:
+        InputError: naming ``name``, what was given and what is allowed.
+    """
+    try:
+        found = float(text)
+    except ValueError:
+        raise InputError(f"{name} = {shown(text)}: must be a number{_from_to(low, high)}") from None
+    return number(name, found, low, high)
 
 
 def whole(name: str, value: Any, low: float, high: float = math.inf) -> int:
@@ -113,11 +127,11 @@ def shown(value: Any) -> str:
     """``value`` for a message: on one line, and not too long."""
     try:
         text = f"{value:g}" if isinstance(value, float) else repr(value)
-    except ValueError:
-        # Python does not print very long integers.
+    except (ValueError, RecursionError):
+        # Python prints neither very long integers nor what is nested as deep.
         text = f"an integer of {value.bit_length()} bits" if isinstance(value, int) else f"a {type(value).__name__}"
     text = " ".join(text.split())
-    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
 def _is_real(value: Any) -> bool:

@@ -200,7 +200,8 @@ def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeyp
 
 
 @pytest.mark.parametrize(
-    ("near", "said"), [(40 * "0.6,", "near has 40 values: give at most 32"), ("x", "near = 'x': must be a number")]
+    ("near", "said"),
+    [(40 * "0.6,", "near has 40 values: give at most 32"), ("x", "near = 'x': must be a number from -1 to 2")],
 )
 def test_what_a_column_is_near_is_checked(client, near, said):
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4", "near": near}
@@ -281,7 +282,10 @@ def test_exports(client, what):
     [
         ({}, "missing slope"),
         (PAPER, "missing Q"),
-        (PAPER | {"Q": "much"}, "'much': must be a number"),
+        (PAPER | {"Q": "much"}, "Q = 'much': must be a number"),
+        (PAPER | {"Q": "3", "slope": "steep"}, "slope = 'steep': must be a number"),
+        (PAPER | {"Q": "3", "ew": "nan"}, "ew = nan: must be a finite number"),
+        (PAPER | {"Q": "3", "e": ""}, "e = '': must be a number"),
         (PAPER | {"Q": "nan"}, "must be from"),
         (PAPER | {"Q": "1e300"}, "must be from"),
         (PAPER | {"Q": "3", "e": "1.2"}, "restitution e = 1.2"),

@@ -28,6 +28,10 @@ def tab(served):
         tab.on("console", lambda message: troubles.append(message.text) if message.type == "error" else None)
         tab.on("request", lambda request: asked.append(request.url))
         vars(tab).update(troubles=troubles, asked=asked)
+        # The search may have to be compiled first.
+        tab.goto("/")
+        expect(tab.locator("#says")).not_to_be_empty(timeout=120_000)
+        asked.clear()
         yield tab
         browser.close()
 

@@ -145,6 +145,7 @@ def explored():
     try:
         found = re.search(r":(\d+)/", process.stdout.readline())
         assert found
+        assert process.stdout.readline().startswith("Its first answers come in ")
         yield process, int(found[1])
     finally:
         if process.poll() is None:

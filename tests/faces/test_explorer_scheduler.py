@@ -161,6 +161,49 @@ def test_who_waits_too_long_for_a_worker_is_told(played, monkeypatch):
     assert again.status == 200
 
 
+@pytest.fixture
+def starts(monkeypatch):
+    """When each worker began to start and was ready; that takes as if there was something to compile."""
+    spans = []
+
+    class Slow(Worker):
+        def start(self):
+            if self.pid is None:
+                began = time.monotonic()
+                super().start()
+                time.sleep(0.5)
+                spans.append((began, time.monotonic()))
+
+    monkeypatch.setattr(scheduling, "Worker", Slow)
+    return spans
+
+
+def test_the_first_worker_starts_alone(played, starts):
+    async def play(scheduler):
+        questions = ("curve", "map", "stability")
+        return await asyncio.gather(*(scheduler.ask(question, does("nap", seconds=0), ONE) for question in questions))
+
+    assert {answer.status for answer in played(play)} == {200}
+    assert len(starts) >= 3
+    assert all(began >= starts[0][1] for began, _ in starts[1:])
+
+
+@pytest.mark.usefixtures("starts")
+def test_waiting_for_the_first_worker_counts_for_no_question(played, monkeypatch):
+    monkeypatch.setattr(scheduling, "_LONGEST_WAIT", 0.3)
+    monkeypatch.setattr(scheduling, "_PATIENCE", 0.05)
+    assert played(lambda scheduler: scheduler.ask("map", does("nap", seconds=0), ONE)).status == 200
+
+
+def test_every_worker_of_the_explorer_is_warm_before_it_answers():
+    scheduler = Scheduler()
+    try:
+        warm = [worker._warm for crew in scheduler._crews.values() for worker in crew.workers]
+        assert all([question for question, _ in questions] == ["flows", "curve"] for questions in warm)
+    finally:
+        scheduler.close()
+
+
 def test_what_nobody_waits_for_is_ended_or_not_begun(played, tmp_path):
     async def gone():
         return True

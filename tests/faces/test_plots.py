@@ -190,7 +190,8 @@ def family_map(within, points=40):
     (branch,) = curve(PAPER, points=points, surface_temperature=within).branches
     kh = np.geomspace(1e-3, 1.0, 5)
     growth = np.tile(np.linspace(-1.0, 1.0, len(branch.flows)), (5, 1))
-    return FamilyMap(branch.flows, 90.0, kh, growth, growth, (), ())
+    smallest = np.zeros(len(branch.flows))
+    return FamilyMap(branch.flows, 90.0, kh, growth, growth, growth > 0.0, np.isnan(growth), smallest, (), ())
 
 
 @pytest.mark.parametrize("within", [(0.05, 50.0), (0.9, 3.3), (1e-3, 1e5)])

@@ -16,6 +16,7 @@ from chuteflow.numerics.newton import newton
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
 from chuteflow.steady.elements import MOST_ELEMENTS, Elements
 from chuteflow.steady.model import Model
+from chuteflow.threads import on_one_thread
 
 #: Relative tolerance in Q, h and M unless another is asked for.
 TOLERANCE = 1e-10
@@ -126,7 +127,8 @@ def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, A
     return other, np.concatenate([z[..., :-2] @ matrix.T, z[..., -2:]], axis=-1)
 
 
-# A flow that runs away is told by what is not finite.
+# It runs when a flow is first asked for its fields, and a flow that runs away is told by what is not finite.
+@on_one_thread
 @np.errstate(all="ignore")
 def collocate(solution: Solution) -> tuple[Collocation, Array]:
     """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.

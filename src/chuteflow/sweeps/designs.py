@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow.checks import MOST_SHOWN, number, number_in, shown
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.sobol import Sobol
@@ -24,23 +25,11 @@ MOST_POINTS = 1 << 40
 _BLOCK = 4096
 _LARGEST_SEED = (1 << 64) - 1
 _SCALES = ("linear", "log")
-#: Characters of a value that a message shows.
-_SHOWN = 60
-
-
-def shown(value: Any) -> str:
-    """A value of a study for a message, however long it is."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):
-        # Integers of thousands of digits, and lists nested as deep, have no text.
-        text = f"a very long {type(value).__name__}"
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
 def shown_key(name: str) -> str:
     """The name of a key for a message: as it is, or quoted where it is long or cannot be printed."""
-    return name if name.isprintable() and len(name) <= _SHOWN else shown(name)
+    return name if name.isprintable() and len(name) <= MOST_SHOWN else shown(name)
 
 
 def shown_path(path: str | os.PathLike[str]) -> str:
@@ -137,7 +126,7 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     values = _listed(value)
     if not values:
         raise InputError(f"{key} = []: give at least one value")
-    return Axis(name, np.array([_number(key, one) for one in values]))
+    return Axis(name, np.array([number(key, one) for one in values]))
 
 
 def _listed(value: Any) -> list[Any]:
@@ -153,7 +142,7 @@ def _range(name: str, key: str, value: Mapping[str, Any]) -> Axis:
     for one in ("from", "to"):
         if one not in value:
             raise InputError(f"{key}.{one} is missing: a range has from and to")
-    low, high = _number(f"{key}.from", value["from"]), _number(f"{key}.to", value["to"])
+    low, high = number(f"{key}.from", value["from"]), number(f"{key}.to", value["to"])
     scale = value.get("scale", "linear")
     if scale not in _SCALES:
         raise InputError(f"{key}.scale = {shown(scale)}: choose one of {', '.join(_SCALES)}")
@@ -200,8 +189,8 @@ def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     """Independent points, the same whatever the size of the pieces."""
     points, seed = _points(head), _seed(head)
 
-    def block(number: int) -> Array:
-        return np.random.default_rng([seed, number]).random((_BLOCK, len(axes)))
+    def block(index: int) -> Array:
+        return np.random.default_rng([seed, index]).random((_BLOCK, len(axes)))
 
     def rows(first: int, last: int) -> dict[str, Array]:
         begin = first // _BLOCK
@@ -298,20 +287,10 @@ def _columns(path: Path, lines: Iterator[list[str]], words: Mapping[str, Any]) -
         if len(line) != len(names):
             raise InputError(f"design.file: line {i} of {path} has {len(line)} columns: the first has {len(names)}")
         for name, text in zip(names, line, strict=True):
-            columns[name].append(text.strip() if name in words else _number(f"{path.name}, {shown_key(name)}", text))
+            columns[name].append(text.strip() if name in words else number_in(f"{path.name}, {shown_key(name)}", text))
     if not names or not columns[names[0]]:
         raise InputError(f"design.file: {path} needs a line of names and at least one of numbers")
     return {name: column if isinstance(column, list) else np.array(column) for name, column in columns.items()}
-
-
-def _number(key: str, value: Any) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(f"{key} = {shown(value)}: must be a number")
-    return number
 
 
 def _points(head: Mapping[str, Any]) -> int:

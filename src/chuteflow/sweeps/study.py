@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.checks import shown
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
@@ -26,7 +27,6 @@ from chuteflow.sweeps.designs import (
     Design,
     axis_from,
     list_design,
-    shown,
     shown_key,
     shown_path,
 )

@@ -34,6 +34,7 @@ def command(port: int | None, host: str | None, no_browser: bool) -> None:
         click.echo(f"chuteflow: anyone who reaches {address} can use this server", err=True)
         hosts = None if address in _ANY else (*LOOPBACK, address)
     click.echo(f"The explorer is at {page}   (Ctrl-C ends it)")
+    click.echo("Its first answers come in a few seconds, or in about half a minute where the search is compiled first")
     served = application(hosts)
     settings = uvicorn.Config(
         served, http=Connection, ws="none", log_level="error", lifespan="on", timeout_graceful_shutdown=1

@@ -123,7 +123,7 @@ def _place(flow: Flow) -> dict[str, Any]:
     """Where a flow is on the curve, how well that is known, and how far the flow keeps to the theory."""
     told = contract.flow_object(flow)
     names = (*(NUMBERS[name].symbol for name in contract.PLACE), "error", "validity")
-    return {name: told[name] for name in names if name in told}
+    return {name: told[name] for name in names}
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
@@ -166,8 +166,8 @@ def _curve(query: Query) -> Answer:
     content = contract.curve_object(found)
     for branch, entry in zip(found.branches, content["branches"], strict=True):
         entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
-        if "validity" in entry:
-            entry["validity"] = {"words": entry["validity"]["words"]}
+        # The page shows where the limits are passed, without the numbers behind it.
+        entry["validity"] = {"words": entry["validity"]["words"]}
     return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from chuteflow.checks import number_in
 from chuteflow.errors import InputError
 from chuteflow.faces.contract import PARAMETERS
 from chuteflow.steady.chute import SURFACES, Chute
@@ -109,7 +109,10 @@ def read(query: Query, *, other: tuple[str, ...] = (), optional: tuple[str, ...]
     missing = [name for name in needed if name not in given]
     if missing:
         raise InputError(f"missing {', '.join(missing)}: for example {missing[0]}={_BASE.get(missing[0], 'slope')}")
-    chute: dict[str, Any] = {long: given[short] for short, long in PARAMETERS.items()}
+    chute: dict[str, Any] = {
+        long: given[short] if short in _DEFAULTS else number_in(short, given[short])
+        for short, long in PARAMETERS.items()
+    }
     return Chute(**chute), {name: given[name] for name in (*other, *optional) if name in given}
 
 
@@ -119,7 +122,7 @@ def flux(text: str) -> float:
     Raises:
         InputError: for what is no number, or out of range.
     """
-    return _number("Q", text, *FLUX_RANGE)
+    return number_in("Q", text, *FLUX_RANGE)
 
 
 def scales(given: Query) -> Scales | None:
@@ -133,7 +136,9 @@ def scales(given: Query) -> Scales | None:
         return None
     if len(named) == 1:
         raise InputError(f"SI units need {' and '.join(GRAINS)}: only {named[0]} is given")
-    return Scales(_number("diameter", given["diameter"], 1e-9, 1e3), _number("density", given["density"], 1e-3, 1e6))
+    return Scales(
+        number_in("diameter", given["diameter"], 1e-9, 1e3), number_in("density", given["density"], 1e-3, 1e6)
+    )
 
 
 @dataclass(frozen=True)
@@ -174,15 +179,5 @@ def map_column(query: Query) -> ColumnAsked:
     near = [text for text in other.get("near", "").split(",") if text]
     if len(near) > MOST_NEAR:
         raise InputError(f"near has {len(near)} values: give at most {MOST_NEAR}")
-    values = tuple(_number("near", text, -1.0, 2.0) for text in near)
-    return ColumnAsked(chute, x, y, _number("place", other["place"], 0.0, 1.0), values)
-
-
-def _number(name: str, text: str, low: float, high: float) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise InputError(f"{name} = {text[:40]!r}: must be a number") from None
-    if not (math.isfinite(value) and low <= value <= high):
-        raise InputError(f"{name} = {value:g}: must be from {low:g} to {high:g}")
-    return value
+    values = tuple(number_in("near", text, -1.0, 2.0) for text in near)
+    return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import os
 from collections import Counter, OrderedDict, deque
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +14,7 @@ from typing import ParamSpec, TypeVar
 from chuteflow.faces.explorer import queries
 from chuteflow.faces.explorer.answers import Answer, answer, left_out, problem
 from chuteflow.faces.explorer.worker import Compute, Ended, Limits, Worker
+from chuteflow.processes import available_cores
 
 #: Tells whether who asked is gone.
 Gone = Callable[[], Awaitable[bool]]
@@ -45,8 +45,7 @@ class Stage:
 
 def lanes() -> dict[str, Lane]:
     """The lanes of this machine. Each has two processes or more, so that one slow question leaves another free."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    quick = max(2, min(4, cores))
+    quick = max(2, min(4, available_cores()))
     return {
         "quick": Lane(quick, 0, early=True),
         "slow": Lane(2, 10, early=True),
@@ -100,7 +99,7 @@ class _Crew:
     """The workers of a lane, and the questions that wait for them."""
 
     def __init__(self, lane: Lane, compute: Compute) -> None:
-        warm = _first_questions() if lane.early and compute is answer else ()
+        warm = _first_questions() if compute is answer else ()
         self.workers = [Worker(nice=lane.nice, warm=warm, compute=compute) for _ in range(lane.workers)]
         # The one used last is used next, so that others start only where it does not suffice.
         self.free: list[Worker] = []
@@ -134,6 +133,10 @@ class Scheduler:
         self._count = itertools.count(1)
         self._tasks: set[asyncio.Task[None]] = set()
         self._closed = False
+        # The first worker starts alone: where the search has to be compiled, the others load what it has compiled.
+        self._first_starts = False
+        # Since when questions wait for a worker, and no longer for the first one to be ready.
+        self._ready: float | None = None
 
     def start(self) -> None:
         """Start the processes that are to run early, and ask them what the page asks as it opens."""
@@ -196,7 +199,9 @@ class Scheduler:
 
     def _give_up_waiting(self, job: _Job) -> None:
         waiting = self._crews[job.at.lane].waiting
-        if job in waiting and asyncio.get_running_loop().time() - job.since > _LONGEST_WAIT:
+        if self._ready is None or job not in waiting:
+            return
+        if asyncio.get_running_loop().time() - max(job.since, self._ready) > _LONGEST_WAIT:
             waiting.remove(job)
             self._finish(job, left_out(job.question, job.query, _TOO_BUSY))
 
@@ -241,8 +246,11 @@ class Scheduler:
 
     def _start_next(self, crew: _Crew) -> None:
         """Start one more worker where some wait, or where all are to run from the start."""
-        if crew.cold and (crew.waiting or crew.early) and not (crew.starting or self._closed):
+        if self._first_starts or self._closed:
+            return
+        if crew.cold and (crew.waiting or crew.early) and not crew.starting:
             crew.starting = True
+            self._first_starts = self._ready is None
             self._spawn(self._started(crew, crew.cold.popleft()))
 
     async def _started(self, crew: _Crew, worker: Worker) -> None:
@@ -251,7 +259,12 @@ class Scheduler:
         await self._run(worker.start)
         crew.starting = False
         crew.free.append(worker)
-        self._dispatch(crew)
+        if self._ready is None:
+            self._first_starts, self._ready = False, asyncio.get_running_loop().time()
+            for other in self._crews.values():
+                self._dispatch(other)
+        else:
+            self._dispatch(crew)
 
     def _turn(self, job: _Job) -> tuple[int, int, int]:
         """Next is the address that was served longest ago, then its client, then the question that came first."""

@@ -6,17 +6,18 @@ import math
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from importlib import import_module
-from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnProcess
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from chuteflow.processes import starting_processes
 
 # A process that starts imports this module first: what computes is imported later, by who watches over it.
 if TYPE_CHECKING:
@@ -24,17 +25,15 @@ if TYPE_CHECKING:
 
 #: Computes the answer to a question with its query; it runs in the worker, which finds it by its module and name.
 Compute = Callable[[str, Mapping[str, str]], "Answer"]
-#: Questions with their queries that a worker answers once as it starts, so that what they need is loaded.
+#: Questions with their queries that a worker answers once as it starts, so that what they need is loaded, and compiled
+#: where this machine has not done that before. No limit counts it.
 Questions = Sequence[tuple[str, Mapping[str, str]]]
 
 #: Seconds between two looks at the time a computation has taken, and between two attempts to interrupt it.
 _LOOK, _AGAIN = 0.05, 0.25
-#: Seconds that a computation may take to end once it is interrupted, and a process to start.
-_GRACE, _START = 1.0, 60.0
+#: Seconds that a computation may take to end once it is interrupted, and a process to start, which may have to compile.
+_GRACE, _START = 1.0, 300.0
 T = TypeVar("T")
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-# Processes are started from several threads; the environment that they inherit is changed meanwhile.
-_starting = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,7 @@ class Worker:
         control, heard = context.Pipe()
         arguments = far, heard, self._nice, self._warm, self._compute.__module__, self._compute.__qualname__
         process = context.Process(target=_serve, args=arguments, daemon=True)
-        with _starting, limited_children(), _without_interrupts():
+        with starting_processes():
             process.start()
         far.close()
         heard.close()
@@ -178,36 +177,6 @@ class Worker:
         for pipe in pipes:
             if pipe is not None:
                 pipe.close()
-
-
-@contextmanager
-def limited_children() -> Iterator[None]:
-    """Give one thread of linear algebra to every process started within, and leave the environment as it was."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _without_interrupts() -> Iterator[None]:
-    """Processes started within do not hear Ctrl-C before they are able to: it goes to all of a terminal's processes."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    # Its own helper process would unblock the signal as it starts.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(pipe: Pipe, control: Pipe, nice: int, warm: Questions, module: str, name: str) -> None:
@@ -247,6 +216,7 @@ class _Watch:
         self._due: tuple[int, Ended] | None = None
         # Ctrl-C is for the server alone. The same signal interrupts a computation, on every system.
         signal.signal(signal.SIGINT, self._heard)
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._unraisable
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         threading.Thread(target=self._run, daemon=True).start()
@@ -268,6 +238,11 @@ class _Watch:
     def _heard(self, *_: object) -> None:
         if self._busy.is_set() and self._due is not None and self._due[0] == self._number:
             raise _Interrupt(self._due[1])
+
+    def _unraisable(self, given: Any) -> None:
+        """An interrupt that is lost in a finaliser needs no words: another follows."""
+        if not issubclass(given.exc_type, _Interrupt):
+            self._hook(given)
 
     def _run(self) -> None:
         while self._busy.wait():

@@ -69,7 +69,7 @@ function* stretches(branch, kind) {
 
 /** Lines of a branch: by the kind of density, over a band where the flows are beyond the theory. */
 function linesOf(branch, at) {
-  const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(branch.validity?.words[i]?.length);
+  const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(branch.validity.words[i]?.length);
   const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true }));
   const dash = ([i]) => (branch.density[i] === "monotonic" ? "7 4" : "");
   return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends) }))];

@@ -86,7 +86,7 @@ onChange((has) => {
 
 // --- flows --------------------------------------------------------------------------------------------------------
 
-const beyond = (flow) => (flow.validity?.words.length ? `<span class="beyond">${escaped(flow.validity.words.join(", "))}</span>` : "");
+const beyond = (flow) => (flow.validity.words.length ? `<span class="beyond">${escaped(flow.validity.words.join(", "))}</span>` : "");
 const shown = (symbol, value) => `${symbol.replace(/_(.*)/, "<sub>$1</sub>")} ${number(value * factor(symbol))}${unit(symbol) ? ` ${unit(symbol)}` : ""}`;
 
 const row = (flow, i) => `<label><input type="radio" name="flow" value="${i}"${i === chosen() ? " checked" : ""}>

@@ -22,7 +22,7 @@ export function drawProfiles(list, top, chosen) {
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
       lines: list.flatMap((flow, i) => {
         const points = flow.profile.z.map((z, n) => [flow.profile[symbol][n] * s, z * sz]);
-        const band = flow.validity?.words.length ? [{ points, colour: colour("--beyond"), width: 9, beneath: true }] : [];
+        const band = flow.validity.words.length ? [{ points, colour: colour("--beyond"), width: 9, beneath: true }] : [];
         return [...band, { points, colour: flowColour(i), width: i === chosen ? 3.4 : 2 }];
       }),
     });
