@@ -36,7 +36,7 @@ def public_results():
     stability = chuteflow.stability_of(FLOWS[2], kx=0.01, ky=0.0)
     branch = CURVE.branches[0]
     sample = Sample(0.0, FLOWS[2], stability)
-    marked = MarkedBranch(branch, (sample,) * 24, (Run("stable", branch.flows),))
+    marked = MarkedBranch(branch, (sample,) * 24, (Run("stable", branch.flows),), ())
     return [
         CHUTE,
         FLOWS,
@@ -64,8 +64,10 @@ def public_results():
         marked.runs[0],
         MarkedCurve(CURVE, (marked,)),
         neutral,
-        WaveMap(FLOWS[0], axis, axis, growth, growth, (neutral,)),
-        FamilyMap(branch.flows, 0.0, axis, growth, growth, (neutral,), (branch.flows,)),
+        WaveMap(FLOWS[0], axis, axis, growth, growth, growth > 0.0, growth > 1.0, 1e-6, (neutral,)),
+        FamilyMap(
+            branch.flows, 0.0, axis, growth, growth, growth > 0.0, growth > 1.0, axis, (neutral,), (branch.flows,)
+        ),
     ]
 
 
