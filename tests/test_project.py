@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "chuteflow"
 
 # Ground floor first; a module imports from its own layer and from those before it.
-LAYERS = ("numerics", "theory", "steady", "analysis", "stability", "sweeps", "paper", "faces")
+LAYERS = ("numerics", "theory", "steady", "trajectories", "analysis", "stability", "sweeps", "paper", "faces")
 # What `import chuteflow` offers is made of the layers up to this one, so only those above it may use it.
 PUBLIC_API = "analysis"
 

@@ -1,16 +1,18 @@
 """One flow: the error estimate, the choice of resolution, extreme temperatures, failure as data."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, flows
-from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, Collocation
+from chuteflow import Chute, InputError, flows, load, save
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
+from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import (
     Condition,
     Status,
     checked_tolerance,
-    prolong,
     resolve,
     solve,
     solve_many,
@@ -27,7 +29,7 @@ def test_the_estimated_error_bounds_the_true_one(chute, temperature, tolerance):
     for flow in flows(chute, T_surface=temperature, tolerance=tolerance):
         solution = flow.solution
         condition = Condition.fix(LOG_T, temperature)
-        exact = solve(*prolong(solution.problem, solution.z, 180), condition, 1e-11)
+        exact = solve(solution.elements.halved().halved(), condition, 1e-11)
         true = np.abs(np.expm1(solution.macroscopic - exact.macroscopic))[:LOG_T].max()
         assert true <= flow.error <= tolerance
 
@@ -58,32 +60,55 @@ def test_a_neighbouring_flow_is_reached_from_a_flow():
 def test_many_flows_are_the_same_as_one_by_one():
     starts = [flow.solution for flow in flows(PAPER, Q=3.0)]
     conditions = [Condition.fix(LOG_M, 1.01 * np.exp(s.macroscopic[LOG_M])) for s in starts]
-    many = solve_many([(s.problem, s.z) for s in starts], conditions)
+    many = solve_many([s.elements for s in starts], conditions)
     for s, condition, together in zip(starts, conditions, many, strict=True):
-        alone = solve(s.problem, s.z, condition)
+        alone = solve(s.elements, condition)
         assert together.converged
         np.testing.assert_allclose(together.macroscopic, alone.macroscopic, atol=2e-11)
 
 
-def test_many_flows_fall_back_where_one_start_is_poor():
-    good = flows(PAPER, Q=3.0)[0].solution
-    poor = good.z.copy()
-    poor[:-2] += 1.5 * np.sin(9.0 * good.problem.grid.nodes)
+def test_a_poor_start_leads_to_a_flow_or_to_none():
+    good = flows(PAPER, Q=3.0)[0].solution.elements
+    ends = good.ends + 1.5 * np.sin(9.0 * good.breaks)[:, None]
     condition = Condition.fix(LOG_T, 7.0)
-    first, second = solve_many([(good.problem, good.z), (good.problem, poor)], [condition] * 2)
+    first, second = solve_many([good, replace(good, ends=ends)], [condition] * 2)
     assert first.converged
+    assert second.converged or second.status is Status.NO_CONVERGENCE
     if second.converged:
         np.testing.assert_allclose(first.macroscopic, second.macroscopic, atol=1e-9)
 
 
 def test_no_solution_is_data_not_an_exception():
     steady = model(Chute(0.2, 0.8, 0.8, 0.85))  # base and interior both lose energy
-    problem = Collocation(steady, 16, 0.0)
-    z = np.concatenate([0.1 * problem.grid.nodes, [0.0, 0.0]])
-    solution = solve(problem, z, Condition.fix(LOG_T, 1.0))
+    start = Elements.sample(steady, 0.5, 0.0, np.linspace(0.0, 1.0, 9), lambda s: np.stack([0.1 * s, 0.0 * s], axis=1))
+    solution = solve(start, Condition.fix(LOG_T, 1.0))
     assert solution.status is Status.NO_CONVERGENCE
     assert not solution.converged
     assert "start from a nearer flow" in solution.status.value
+
+
+@pytest.mark.parametrize("chute", [PAPER, STEEP, Chute(0.3, 0.8, 0.8, 0.6, surface="interface")])
+def test_elements_and_chebyshev_grids_agree(chute):
+    for flow in flows(chute, T_surface=0.2):
+        solution = flow.solution
+        state = solution.problem.state(solution.z)
+        assert np.abs(state.residual()).max() < 1e-11
+        np.testing.assert_allclose(state.macroscopic(), solution.macroscopic, atol=2.0 * solution.error + 1e-12)
+
+
+def test_rates_are_derivatives_along_the_branch():
+    first = flows(PAPER, Q=3.0)[2].solution
+    one, other = (resolve(first, Condition.fix(LOG_Q, 3.0 * np.exp(step))) for step in (-1e-4, 1e-4))
+    assert first.rates is not None
+    np.testing.assert_allclose(first.rates, (other.macroscopic - one.macroscopic) / 2e-4, rtol=1e-5)
+
+
+def test_a_deep_flow_has_a_grid_in_pieces_that_files_keep(tmp_path):
+    found = flows(Chute(0.6, 0.36, 0.0, np.sqrt(0.75)), M=20.0)
+    for name in ("deep.nc", "deep.json", "deep.csv"):
+        save(found, tmp_path / name)
+        for flow, again in zip(found, load(tmp_path / name), strict=True):
+            np.testing.assert_array_equal(flow.solution.z, again.solution.z)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 1e-12, 0.1, float("nan")])

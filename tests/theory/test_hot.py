@@ -15,6 +15,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.steady import solver
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation
+from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import reduce
@@ -148,9 +149,9 @@ def test_roots_near_both_ends():
 
 @pytest.mark.parametrize("lambda_", [0.0, 3.0, 3.4, math.inf, -math.inf, math.nan])
 def test_no_solution_is_an_error(lambda_):
-    with pytest.raises(InputError, match="below 3, other than 0"):
+    with pytest.raises(InputError, match="below 3, other than 0|must be a finite number"):
         hot_solution(lambda_)
-    with pytest.raises(InputError, match="below 3, other than 0"):
+    with pytest.raises(InputError, match="below 3, other than 0|must be a finite number"):
         shoot(lambda_)
 
 
@@ -504,7 +505,8 @@ def full_flow(model_: HotModel, temperature: float, tolerance: float) -> solver.
     y = exact.x * problem.share[0]
     gradient = 2.0 * exact.x * (i1e(y) / i0e(y) if exact.lambda_ > 0.0 else -j1(y) / j0(y))
     z = np.append(gradient, [math.log(temperature), math.log(model_.mass_holdup)])
-    return solver.solve(problem, z, solver.Condition.fix(LOG_T, temperature), tolerance)
+    start = Elements.of_collocation(problem, z)
+    return solver.solve(start, solver.Condition.fix(LOG_T, temperature), tolerance)
 
 
 def distances(model_: HotModel, temperature: float) -> np.ndarray:

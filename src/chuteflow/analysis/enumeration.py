@@ -113,7 +113,7 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
         solved, missed = crossings(family, which, value, tolerance)
         solutions += solved
         lost += missed
-    inside = _distinct([s for s in solutions if within.contains(s.macroscopic)])
+    inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
     return _Search(within, found, inside, beyond, lost, search(problem, within).deepest)
 
@@ -189,10 +189,10 @@ def _wider(found: _Search, which: int, value: float) -> Range:
     return wider
 
 
-def _distinct(solutions: list[Solution]) -> list[Solution]:
-    """Without repetitions, hot to cold, then by hold-up."""
+def _distinct(solutions: list[Solution], which: int) -> list[Solution]:
+    """Without repetitions, hot to cold, then by hold-up; surface temperatures that were asked for are one."""
     kept: list[Solution] = []
     for s in solutions:
         if all(np.abs(s.macroscopic - k.macroscopic).max() > _SAME + s.error + k.error for k in kept):
             kept.append(s)
-    return sorted(kept, key=lambda s: (-s.macroscopic[LOG_T], s.macroscopic[LOG_M]))
+    return sorted(kept, key=lambda s: (0.0 if which == LOG_T else -s.macroscopic[LOG_T], s.macroscopic[LOG_M]))

@@ -202,7 +202,11 @@ def _is_behind(point: Point, last: Point) -> bool:
     """Whether a point is the last one, or so close that the roughness of the search put it behind."""
     step = point.m - last.m
     length = float(np.linalg.norm(step))
-    return length < _SAME or (length < 0.5 * _TOO_NEAR and float(step @ last.tangent) < 0.5 * length)
+    ahead, alike = float(step @ last.tangent), float(point.tangent @ last.tangent)
+    if length < 0.5 * _TOO_NEAR:
+        return length < _SAME or ahead < 0.5 * length
+    # On the same side of the branch, and further back on it.
+    return length < _SPACING and ahead < 0.0 and alike > _SHARP
 
 
 def _runs(marked: Array, arclength: Array) -> list[tuple[int, int]]:

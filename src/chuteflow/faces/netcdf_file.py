@@ -25,6 +25,7 @@ from chuteflow.faces import contract, records
 from chuteflow.faces.contract import factor, finite
 from chuteflow.faces.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.faces.references import PAPER, TITLES, numbers_are
+from chuteflow.steady.collocation import WHOLE
 from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity, Scales
 from chuteflow.steady.solver import Status
 from chuteflow.steady.validity import WORDS
@@ -63,6 +64,7 @@ def read(path: Path) -> Result:
     with restored_group(path) as group:
         head = contract.parsed(group.attrs["head"])
         columns = {name: group[name][...].tolist() for name in (*_PER_FLOW, *_INTEGERS, "z", "macroscopic")}
+        columns["breaks"] = contract.parsed(group.attrs.get("breaks", "[]"))
     return records.restored(head, list(_rows(columns)))
 
 
@@ -90,11 +92,15 @@ def _rows(columns: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
     lengths = [whole("the number of unknowns", length, 0) for length in columns["unknowns"]]
     if sum(lengths) != len(columns["z"]):
         raise InputError("a flow has the wrong number of unknowns")
+    breaks = columns.get("breaks") or [[]] * len(lengths)
+    if len(breaks) != len(lengths):
+        raise InputError("the pieces of a grid: as many as flows are needed")
     statuses, kinds = [status.name for status in _STATUS], ("", *KINDS)
     end = 0
     for i, length in enumerate(lengths):
         end += length
         yield {name: columns[name][i] for name in ("degree", "stretch", "branch")} | {
+            "breaks": breaks[i] or None,
             "z": columns["z"][end - length : end],
             "macroscopic": [finite(value) for value in columns["macroscopic"][i]],
             "error": None if columns["error"][i] == math.inf else columns["error"][i],
@@ -196,6 +202,9 @@ def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row])
     solutions = [row.flow.solution for row in found]
     group.attrs["long_name"] = "discretised unknowns, from which chuteflow rebuilds the flows to the last bit"
     group.attrs["head"] = contract.text(records.head(result, found))
+    breaks = [list(s.problem.breaks) if s.problem.breaks != WHOLE else [] for s in solutions]
+    if any(breaks):
+        group.attrs["breaks"] = contract.text(breaks)
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]

@@ -24,10 +24,11 @@ from chuteflow.faces.contract import PARAMETERS, chute_object, finite
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.paper.branches import in_order
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import Collocation
+from chuteflow.steady.collocation import WHOLE, Collocation
+from chuteflow.steady.elements import DEGREES, MOST_PIECES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import DEGREES, Solution, Status, checked_tolerance
+from chuteflow.steady.solver import Solution, Status, checked_tolerance
 from chuteflow.theory.constitutive import Law, fingerprint
 from chuteflow.theory.laws import law
 
@@ -145,7 +146,9 @@ def numbers(what: str, values: Any) -> Array:
 def unknowns(row: Row) -> dict[str, Any]:
     """A discretised flow and its place in the result, as JSON values."""
     solution = row.flow.solution
-    return {
+    breaks = solution.problem.breaks
+    pieces = {"breaks": list(breaks)} if len(breaks) > len(WHOLE) else {}
+    return pieces | {
         "degree": solution.problem.degree,
         "stretch": float(np.reshape(solution.problem.stretch, ())),
         "z": solution.z.tolist(),
@@ -166,7 +169,8 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     # Everything is checked before anything is computed with it: a grid takes the square of its degree in memory.
     degree = whole("the degree of a flow", kept["degree"], 2, max(DEGREES))
     stretch = number("the stretch of a flow", kept["stretch"], 0.0, _LARGEST_STRETCH)
-    if len(kept["z"]) != degree + 3 or len(kept["macroscopic"]) != 4:
+    breaks = _breaks(kept.get("breaks"))
+    if len(kept["z"]) != degree * (len(breaks) - 1) + 3 or len(kept["macroscopic"]) != 4:
         raise InputError("a flow has the wrong number of unknowns")
     z = numbers("the unknowns of a flow", kept["z"])
     if kept["status"] not in Status.__members__:
@@ -174,7 +178,7 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     status = Status[kept["status"]]
     logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
     error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
-    solution = Solution(np.array(logarithms), error, status, (Collocation(model(chute), degree, stretch), z))
+    solution = Solution(np.array(logarithms), error, status, (Collocation(model(chute), degree, stretch, breaks), z))
     if solution.converged:
         with np.errstate(all="ignore"):
             distance = np.abs(solution.problem.state(z).macroscopic() - solution.macroscopic).max()
@@ -183,6 +187,17 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     if kept["special"] and kept["special"] not in KINDS:
         raise InputError(f"it holds an unknown kind of special point, {shown(kept['special'])}")
     return Row(Flow(chute, solution), whole("the branch of a flow", kept["branch"], 0), str(kept["special"]))
+
+
+def _breaks(kept: Any) -> tuple[float, ...]:
+    """The breaks between the pieces of a grid; files have them where there are several."""
+    if kept is None:
+        return WHOLE
+    breaks = numbers("the pieces of a grid", kept)
+    ends = len(breaks) > len(WHOLE) and (breaks[0], breaks[-1]) == WHOLE
+    if not ends or len(breaks) > MOST_PIECES + 1 or np.diff(breaks).min() <= 0.0:
+        raise InputError("the pieces of a grid: their ends must rise from 0 to 1")
+    return tuple(breaks.tolist())
 
 
 def chute_from(kept: Mapping[str, Any]) -> Chute:

@@ -39,6 +39,10 @@ def stretch_position(m: Array, stretch: Array | float) -> Array:
     return np.log1p(m * np.expm1(alpha)) / alpha
 
 
+#: The breaks of a grid in one piece.
+WHOLE = (0.0, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Collocation:
     """The problem of ``model`` on the grid of one ``degree`` n, with one ``stretch``.
@@ -52,12 +56,12 @@ class Collocation:
     model: Model
     degree: int
     stretch: Array | float
-    breaks: tuple[float, ...] = (0.0, 1.0)
+    breaks: tuple[float, ...] = WHOLE
 
     @property
     def grid(self) -> AnyGrid:
         """The grid in s."""
-        return grid(self.degree) if len(self.breaks) == 2 else piecewise_grid(self.breaks, self.degree)
+        return grid(self.degree) if self.breaks == WHOLE else piecewise_grid(self.breaks, self.degree)
 
     @cached_property
     def share(self) -> tuple[Array, Array]:
@@ -76,7 +80,7 @@ class Collocation:
     def transferred(self, degree: int, stretch: Array | float | None = None) -> tuple[Collocation, Array]:
         """The problem on another grid, and the matrix that takes g to its nodes."""
         same = stretch is None or stretch is self.stretch or np.array_equal(stretch, self.stretch)
-        if same and len(self.breaks) == 2:
+        if same and self.breaks == WHOLE:
             return Collocation(self.model, degree, self.stretch), refinement(self.degree, degree)
         other = Collocation(self.model, degree, self.stretch if stretch is None else stretch, self.breaks)
         position = stretch_position(other.share[0], self.stretch)

@@ -23,14 +23,15 @@ from chuteflow.steady.kernel import STAGES
 from chuteflow.steady.model import CONDUCTION, Model
 
 #: Change of theta, and of y over its scale, on one element at most; and its longest part of the grid.
-_CHANGE, _CHANGE_OF_FLUX, _LONGEST = 1.0, 0.5, 0.26
+_CHANGE, _CHANGE_OF_FLUX, _LONGEST = 0.5, 0.25, 0.17
 #: Degrees of Chebyshev grids for a flow, and the decay of the coefficients with which one may resolve it.
 DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
 _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
-#: Elements at most.
+#: Elements at most, and pieces of a grid.
 MOST_ELEMENTS = 768
+MOST_PIECES = MOST_ELEMENTS // _PER_PIECE + 1
 
 
 def _gauss() -> tuple[Array, Array, Array, Array]:

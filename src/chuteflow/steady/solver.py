@@ -23,10 +23,16 @@ TOLERANCE = 1e-10
 _FLOOR, _SAFETY = 1e-12, 4.0
 #: Newton's method ends with a step below this, after which the next one would be below rounding; steps at most.
 _STEP, _MOST_STEPS = 1e-7, 40
+#: After one below this the finer flow is as good as its mesh.
+_FINE_STEP = 2e-6
 #: The hold-up fixes a flow where it is this part of the change along the branch.
-_STEEP = 0.05
+_STEEP = 1e-3
 #: A grid resolves a flow where the coefficients of g and y decay to this, and the integrals agree to the second.
-_RESOLVED, _AGREES = 1e-11, 1e-10
+_RESOLVED, _AGREES = 2e-13, 1e-10
+#: Coefficients that have decayed to this suffice where the integrals agree to rounding.
+_MAY_RESOLVE = 1e-10
+#: Where Newton's method failed on a grid, it counts as resolving a flow so badly.
+_FAILED = 1.0
 
 
 class Status(Enum):
@@ -138,23 +144,28 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
         weights = rates / np.linalg.norm(rates)
     value = np.array(float(weights @ solution.macroscopic))
-    last = None
+    best: tuple[Collocation, Array] | None = None
+    least = np.inf
     for problem, rough in solution.elements.grids():
-        last = problem, rough
         found = newton(
             lambda z, problem=problem: _system(problem.state(z), weights, value),
             rough,
             tolerance=_STEP,
             longest_step=2.0,
         )
-        if found.converged:
-            state = problem.state(found.z)
+        state = problem.state(found.z)
+        off = float(np.abs(state.macroscopic() - solution.macroscopic)[:LOG_T].max())
+        if found.converged and off < max(_AGREES, 10.0 * solution.error):
             decay = tail(problem.grid, np.stack([v / np.abs(v).max() for v in (state.g, state.y)]))
-            off = float(np.abs(state.macroscopic() - solution.macroscopic)[:LOG_T].max())
-            if decay < _RESOLVED and off < max(_AGREES, 10.0 * solution.error):
-                return problem, found.z
-    assert last is not None
-    return last
+            z = found.z
+        else:
+            decay, z = _FAILED, rough
+        if decay < least:
+            best, least = (problem, z), decay
+        if least < _RESOLVED or (least < _MAY_RESOLVE and off < _FLOOR):
+            break
+    assert best is not None
+    return best
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
@@ -170,24 +181,24 @@ def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
 def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
     """The flow nearest to ``start`` that meets ``condition``.
 
-    Newton's method converges on one mesh, and takes one more step on the mesh of twice as many elements: the change
-    in ln Q, ln h and ln M is the error of the coarser solution, and bounds that of the finer, which is returned.
+    Newton's method converges on one mesh, and then on the mesh of twice as many elements, in a step or two: the change
+    in ln Q, ln h, ln M and ln T_surface is the error of the coarser solution, and bounds that of the finer, which is returned.
     The mesh is refined until the change is below ``tolerance``, or below what rounding does, which is more very close
     to a fold.
     """
     weights, value = np.array(condition.weights), condition.value
     coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)
     while np.isfinite(coarse.step):
-        fine = coarse.flow.halved().iterated(weights, value, np.inf, 1, rounding=True)
+        fine = coarse.flow.halved().iterated(weights, value, _FINE_STEP, _MOST_STEPS, rounding=True)
         if not np.isfinite(fine.step):
             break
-        change = float(np.abs(fine.quantities - coarse.quantities)[:LOG_T].max())
-        noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors[:, :LOG_T]).max()))
+        change = float(np.abs(fine.quantities - coarse.quantities).max())
+        noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors).max()))
         if change < max(tolerance, noise):
             return Solution(fine.quantities, max(change, noise), Status.CONVERGED, fine.flow, fine.rates)
         if len(fine.flow.slopes) > MOST_ELEMENTS:
             return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
-        coarse = fine.flow.iterated(weights, value, _STEP, _MOST_STEPS)
+        coarse = fine
     return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
 
 
