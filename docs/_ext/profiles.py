@@ -1,4 +1,4 @@
-"""The directive ``density-profiles``: the volume fraction of every flow of one question, side by side, drawn at build."""
+"""The directive ``density-profiles``: the volume fraction of every flow of one question, drawn at build."""
 
 from pathlib import Path
 
