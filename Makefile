@@ -34,7 +34,7 @@ WHEEL = $$(echo dist/chuteflow-*.whl)
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
-demo: $(VENV)/.package $(VENV)/.packages-run ## solve one chute, draw figures 2 and 3 of the paper into demo/
+demo: $(VENV)/.compiled ## solve one chute, draw figures 2 and 3 of the paper into demo/
 	$(BIN)/chuteflow solve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3
 	$(BIN)/chuteflow figures --only 2,3 --out demo
 	@echo "The pictures are in $(CURDIR)/demo:"
@@ -42,10 +42,10 @@ demo: $(VENV)/.package $(VENV)/.packages-run ## solve one chute, draw figures 2 
 
 test: lint types unit ## lint, types and the quick tests, against the installed wheel
 
-test-all: lint types $(VENV)/.package $(VENV)/.packages-test ## as test, with the slow tests
+test-all: lint types $(VENV)/.compiled $(VENV)/.packages-test ## as test, with the slow tests
 	$(BIN)/pytest -n $(WORKERS) -m ""
 
-unit: $(VENV)/.package $(VENV)/.packages-test ## the quick tests alone
+unit: $(VENV)/.compiled $(VENV)/.packages-test ## the quick tests alone
 	$(BIN)/pytest -n $(WORKERS) -m "not slow"
 
 # Every system solved is small: more BLAS threads gain nothing, and take the cores from the other test worker.
@@ -58,11 +58,11 @@ lint: $(VENV)/.packages-test ## style of the code
 types: $(VENV)/.packages-test ## types of the code
 	$(BIN)/basedpyright
 
-docs: $(VENV)/.package $(VENV)/.packages-test ## build the documentation into build/docs/, without network
+docs: $(VENV)/.compiled $(VENV)/.packages-test ## build the documentation into build/docs/, without network
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs build/docs
 	@echo "The documentation is at $(CURDIR)/build/docs/index.html"
 
-bench: $(VENV)/.package $(VENV)/.packages-bench ## time the solver, beside what one would pick instead
+bench: $(VENV)/.compiled $(VENV)/.packages-bench ## time the solver, beside what one would pick instead
 	$(BIN)/python benchmarks/run.py
 
 wheel: dist/.built ## build the wheel into dist/
@@ -96,6 +96,12 @@ $(VENV)/.package: dist/.built
 $(VENV)/.packages-run: pyproject.toml constraints.txt | $(VENV)/.package
 	@echo "== installing the packages that it runs on"
 	@$(INSTALL) "$(WHEEL)"
+	@touch $@
+
+# The loops of the search are compiled at their first call, and kept beside the package.
+$(VENV)/.compiled: $(VENV)/.package $(VENV)/.packages-run
+	@echo "== compiling the search"
+	@$(BIN)/python -W ignore -c "import chuteflow; chuteflow.curve(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), points=10)" 2>/dev/null
 	@touch $@
 
 # After the others, never beside them: with make -j, two pips would write into one environment at once.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, flows, load, save
+from chuteflow import Chute, FlowSet, InputError, flows, load, save
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import model
@@ -107,7 +107,9 @@ def test_a_deep_flow_has_a_grid_in_pieces_that_files_keep(tmp_path):
     found = flows(Chute(0.6, 0.36, 0.0, np.sqrt(0.75)), M=20.0)
     for name in ("deep.nc", "deep.json", "deep.csv"):
         save(found, tmp_path / name)
-        for flow, again in zip(found, load(tmp_path / name), strict=True):
+        loaded = load(tmp_path / name)
+        assert isinstance(loaded, FlowSet)
+        for flow, again in zip(found, loaded, strict=True):
             np.testing.assert_array_equal(flow.solution.z, again.solution.z)
 
 

@@ -149,9 +149,9 @@ def test_roots_near_both_ends():
 
 @pytest.mark.parametrize("lambda_", [0.0, 3.0, 3.4, math.inf, -math.inf, math.nan])
 def test_no_solution_is_an_error(lambda_):
-    with pytest.raises(InputError, match="below 3, other than 0|must be a finite number"):
+    with pytest.raises(InputError, match=r"below 3, other than 0|must be a finite number"):
         hot_solution(lambda_)
-    with pytest.raises(InputError, match="below 3, other than 0|must be a finite number"):
+    with pytest.raises(InputError, match=r"below 3, other than 0|must be a finite number"):
         shoot(lambda_)
 
 

@@ -93,7 +93,7 @@ def _branch(chute: Chute, family: TracedFamily, count: int, tolerance: float) ->
     located = [*_folds(chute, family, tolerance), *_changes(chute, family, tolerance)]
     ends, heading = family.ends, 1.0
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
-        solutions, ends, heading = solutions[::-1], ends[::-1], -1.0
+        solutions, ends, heading = solutions[::-1], (ends[1], ends[0]), -1.0
         places = places[::-1]
     flows = flows_of(chute, solutions)
     special = []

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.analysis.paths import Chord, Point, Turn, find_value, point_at, refined, turns
 from chuteflow.analysis.ranges import CLOSED, Range
@@ -22,6 +23,8 @@ from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_d
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
+#: Reaches over which the direction of a rough branch is looked for.
+_REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
 #: there is not known.
 _SHARP = 0.8
@@ -32,6 +35,9 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 NEAR, _PER_SPACING = 0.005, 0.15
 #: One flow is solved at once where the quantity changes by more than this along the branch, per length.
 _STEEP = 0.15
+#: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
+#: where it changes by more than the second along the branch, per length.
+_NEARLY, _FIXES = 0.01, 1e-3
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
 _AT_EDGE = 1e-6
 #: Points that differ by less are one.
@@ -63,17 +69,19 @@ class Family:
         return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
 
     def _direction(self, i: int) -> Array | None:
-        """Unit vector (4,) along the branch at rough flow ``i``; None where it turns sharply there."""
+        """Unit vector (4,) along the branch at rough flow ``i``: over the shortest reach to both sides in which it
+        does not turn sharply, since rough flows scatter; None where it does in all."""
         length, m = self.arclength, self.macroscopic
-        before = max(int(np.searchsorted(length, length[i] - _TOO_NEAR, side="right")) - 1, 0)
-        after = min(int(np.searchsorted(length, length[i] + _TOO_NEAR, side="left")), len(m) - 1)
-        sides = m[i] - m[before], m[after] - m[i]
-        sizes = [float(np.linalg.norm(side)) for side in sides]
-        if min(sizes) > 0.0 and float(sides[0] @ sides[1]) < _SHARP * sizes[0] * sizes[1]:
-            return None
-        chord = m[after] - m[before]
-        size = float(np.linalg.norm(chord))
-        return chord / size if size > 0.0 else None
+        for reach in _REACHES:
+            before = max(int(np.searchsorted(length, length[i] - reach, side="right")) - 1, 0)
+            after = min(int(np.searchsorted(length, length[i] + reach, side="left")), len(m) - 1)
+            sides = m[i] - m[before], m[after] - m[i]
+            sizes = [float(np.linalg.norm(side)) for side in sides]
+            chord = sides[0] + sides[1]
+            size = float(np.linalg.norm(chord))
+            if size > 0.0 and float(sides[0] @ sides[1]) >= _SHARP * sizes[0] * sizes[1]:
+                return chord / size
+        return None
 
     def _bend(self, i: int) -> float:
         """How far the rough flow lies beside the chord of its neighbours."""
@@ -209,7 +217,7 @@ def _is_behind(point: Point, last: Point) -> bool:
     return length < _SPACING and ahead < 0.0 and alike > _SHARP
 
 
-def _runs(marked: Array, arclength: Array) -> list[tuple[int, int]]:
+def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
     """First and last places of the runs of marked ones, each with neighbours to either side."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(int)))
     runs: list[tuple[int, int]] = []
@@ -259,8 +267,10 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
     for (_, one), (_, other) in pairwise(placed):
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
-            _, point = find_value(Chord(one, other, tolerance), which, target)
-            found.append(_polished(point, which, target, tolerance))
+            found.append(_between(Chord(one, other, tolerance), which, target))
+    seen = family.macroscopic[[begin, end], which] - target
+    if len(found) % 2 != ((seen[0] >= 0.0) != (seen[1] >= 0.0)) and not turning:
+        raise SolveError("a flow seen in the search was not found on its branch")
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution
@@ -276,14 +286,17 @@ def _at_fold(near: Solution) -> Solution:
     return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 
-def _polished(point: Point, which: int, target: float, tolerance: float) -> Solution:
-    """The flow at a point whose quantity is that asked for to rounding; its error is what that may do to the others."""
-    tangent = abs(float(point.tangent[which]))
-    near = point.solution
-    if tangent > 1e-3:
-        solution = resolve(near, Condition.fix(which, float(np.exp(target))), tolerance)
-        if solution.converged and np.linalg.norm(solution.macroscopic - near.macroscopic) < 1e-5:
-            return solution
+def _between(chord: Chord, which: int, target: float) -> Solution:
+    """The flow on a chord at which a quantity takes a value: at the value itself, where that fixes it, else in the
+    plane across the branch, with an error that says what the difference may do to the other quantities."""
+    _, point = find_value(chord, which, target, _NEARLY)
+    if abs(point.tangent[which]) > _FIXES:
+        fixed = resolve(point.solution, Condition.fix(which, float(np.exp(target))), chord.tolerance)
+        moved = float(np.linalg.norm(fixed.macroscopic - point.m))
+        if fixed.converged and moved < chord.length and 0.0 <= chord.place(fixed.macroscopic) <= 1.0:
+            return fixed
+    _, point = find_value(chord, which, target, 0.0)
+    near, tangent = point.solution, abs(float(point.tangent[which]))
     error = near.error / max(tangent, float(np.sqrt(near.error)))
     return Solution(near.macroscopic, error, near.status, near.source, near.rates)
 

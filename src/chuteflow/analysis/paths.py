@@ -241,13 +241,14 @@ def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Po
         yield at + (1.0 - at) * place, point
 
 
-def find_value(chord: Chord, which: int, target: float) -> tuple[float, Point]:
-    """Where the quantity ``which``, monotonic along the chord, takes the value ``target`` between its ends."""
+def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[float, Point]:
+    """Where the quantity ``which``, monotonic along the chord, takes the value ``target`` between its ends, to
+    ``close`` of the larger distance of these from it."""
 
     def off(point: Point) -> tuple[float, float | None]:
         return float(point.m[which]) - target, float(chord.slope(point)[which])
 
-    return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]))
+    return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]), close)
 
 
 def find_zero(chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]) -> tuple[float, Point]:
@@ -256,7 +257,10 @@ def find_zero(chord: Chord, function: Callable[[Solution], float], ends: tuple[f
 
 
 def _located(
-    chord: Chord, function: Callable[[Point], tuple[float, float | None]], ends: tuple[float, float]
+    chord: Chord,
+    function: Callable[[Point], tuple[float, float | None]],
+    ends: tuple[float, float],
+    close: float = _CLOSE,
 ) -> tuple[float, Point]:
     """The zero of a function (its value, and its derivative to sigma where it has one) along a chord.
 
@@ -268,14 +272,15 @@ def _located(
     if f_high == 0.0:
         return 1.0, chord.last
     scale = max(abs(f_low), abs(f_high))
-    sigma = f_low / (f_low - f_high)
+    sigma, point = f_low / (f_low - f_high), chord.first
     side = 0
     for _ in range(80):
-        point = chord.at(sigma)
-        if point is None:
+        reached = chord.at(sigma)
+        if reached is None:
             raise SolveError("a branch of flows could not be followed to a point on it")
+        point = reached
         f, slope = function(point)
-        if abs(f) <= max(_ROUNDING, _CLOSE * scale) or high - low < _CLOSE:
+        if abs(f) <= max(_ROUNDING, close * scale) or high - low < _CLOSE:
             return sigma, point
         if (f > 0.0) == (f_high > 0.0):
             high, f_high, f_low = sigma, f, 0.5 * f_low if side == 1 else f_low

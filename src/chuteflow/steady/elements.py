@@ -40,9 +40,10 @@ def _gauss() -> tuple[Array, Array, Array, Array]:
     points, weights = np.polynomial.legendre.leggauss(STAGES)
     points, weights = 0.5 * (points + 1.0), 0.5 * weights
     powers = np.arange(1, STAGES + 1)
-    coefficients = np.linalg.inv(points[:, None] ** (powers - 1)) / powers[:, None]
-    integrals = points[:, None] ** powers @ coefficients
-    return np.stack([points, weights]), integrals, np.linalg.inv(integrals), coefficients
+    coefficients: Array = np.linalg.inv(points[:, None] ** (powers - 1)).astype(float) / powers[:, None]
+    integrals: Array = points[:, None] ** powers @ coefficients
+    differences = np.linalg.inv(integrals).astype(float)
+    return np.stack([points, weights]), integrals, differences, coefficients
 
 
 _GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()

@@ -14,8 +14,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from chuteflow.numerics.compiled import compiled
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, GRIP, LOSS, OFFSET, SHEAR, UPPER, WORK
 
 #: Gauss points of an element.
@@ -25,10 +25,8 @@ _ROUNDING = 2e-14
 #: The longest step of Newton's method, and the largest change of ln x trusted.
 _LONGEST, _HALVINGS = 2.0, 8
 
-_jit: Any = njit(cache=True, nogil=True)
 
-
-@_jit
+@compiled
 def closures(table: Any, x: float, f: Any) -> None:
     """The closures at x and their derivatives with respect to ln x, into ``f`` (16,)."""
     degree, pieces, width = table.shape
@@ -47,7 +45,7 @@ def closures(table: Any, x: float, f: Any) -> None:
         f[q] *= by_log
 
 
-@_jit
+@compiled
 def _solve_dense(matrix: Any, right: Any) -> bool:
     """Solve in place by Gauss elimination with row pivoting; the right sides are the rows' (n, r)."""
     n, r = right.shape
@@ -80,7 +78,7 @@ def _solve_dense(matrix: Any, right: Any) -> bool:
     return True
 
 
-@_jit
+@compiled
 def _assemble(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
     local: Any, quantities: Any, by_ends: Any, by_slopes: Any,
@@ -208,7 +206,7 @@ def _assemble(
     return worst if math.isfinite(worst) else math.inf
 
 
-@_jit
+@compiled
 def _step(
     gauss: Any, integrals: Any, breaks: Any, chute: Any, ends: Any, slopes: Any, local: Any, quantities: Any,
     by_ends: Any, by_slopes: Any, rows: Any, values: Any, mass_share: float, ends_out: Any, slopes_out: Any,
@@ -323,7 +321,7 @@ def _step(
     return True
 
 
-@_jit
+@compiled
 def _change_of_quantities(
     integrals: Any, breaks: Any, by_ends: Any, by_slopes: Any, ends: Any, slopes: Any, out: Any
 ) -> None:
@@ -343,7 +341,7 @@ def _change_of_quantities(
     out[3] = by_ends[0, 0, 1] * ends[0, 0]
 
 
-@_jit
+@compiled
 def iterate(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
     rows: Any, value: float, tolerance: float, most: int, quantities: Any, rates: Any, errors: Any,
@@ -408,7 +406,7 @@ def iterate(
     return mu, math.inf
 
 
-@_jit
+@compiled
 def direction(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
     rows: Any, out: Any, ends_out: Any, slopes_out: Any,
@@ -440,13 +438,13 @@ def direction(
     return change_ends[1, count + 1, 0], math.isfinite(out.sum())
 
 
-@_jit
+@compiled
 def positions(s: Any, stretch: float, other: float) -> Any:
     """Grid coordinates with stretch ``other`` of the places ``s`` with another stretch."""
     return np.log1p(np.expm1(stretch * s) / math.expm1(stretch) * math.expm1(other)) / other
 
 
-@_jit
+@compiled
 def distribute(s: Any, theta: Any, y: Any, per_flux: float, longest: float) -> Any:
     """Element boundaries on [0, 1] between which samples of theta and y (ascending in ``s``) change about equally:
     as many that the change in each, with a part for its length, is 1 at most."""
@@ -468,7 +466,7 @@ def distribute(s: Any, theta: Any, y: Any, per_flux: float, longest: float) -> A
     return breaks
 
 
-@_jit
+@compiled
 def evaluate(breaks: Any, ends: Any, slopes: Any, cardinal: Any, s: Any, out: Any) -> None:
     """theta and y at places ``s`` (k,) ascending, into ``out`` (k, 2); ``cardinal`` (STAGES, STAGES) holds the
     integrals of the cardinal polynomials as coefficients of t, t^2, ..."""
@@ -489,7 +487,7 @@ def evaluate(breaks: Any, ends: Any, slopes: Any, cardinal: Any, s: Any, out: An
                 out[i, c] += value * slopes[e, j, c]
 
 
-@_jit
+@compiled
 def places(breaks: Any, points: Any) -> Any:
     """The ends of the elements and the Gauss points in each, ascending (N (STAGES + 1) + 1,)."""
     count = len(breaks) - 1
@@ -502,7 +500,7 @@ def places(breaks: Any, points: Any) -> Any:
     return out
 
 
-@_jit
+@compiled
 def fit(breaks: Any, values: Any, differences: Any, ends: Any, slopes: Any) -> None:
     """The polynomials through ``values`` (N (STAGES + 1) + 1, 2) at :func:`places`; ``differences`` is the inverse of
     the integrals."""

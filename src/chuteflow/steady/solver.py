@@ -11,7 +11,7 @@ import numpy as np
 
 from chuteflow.checks import real
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array, tail
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
 from chuteflow.steady.elements import MOST_ELEMENTS, Elements
@@ -27,12 +27,8 @@ _STEP, _MOST_STEPS = 1e-7, 40
 _FINE_STEP = 2e-6
 #: The hold-up fixes a flow where it is this part of the change along the branch.
 _STEEP = 1e-3
-#: A grid resolves a flow where the coefficients of g and y decay to this, and the integrals agree to the second.
-_RESOLVED, _AGREES = 2e-13, 1e-10
-#: Coefficients that have decayed to this suffice where the integrals agree to rounding.
-_MAY_RESOLVE = 1e-10
-#: Where Newton's method failed on a grid, it counts as resolving a flow so badly.
-_FAILED = 1.0
+#: A grid resolves a flow where its integrals agree to this.
+_AGREES = 3e-12
 
 
 class Status(Enum):
@@ -144,8 +140,8 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
         weights = rates / np.linalg.norm(rates)
     value = np.array(float(weights @ solution.macroscopic))
-    best: tuple[Collocation, Array] | None = None
-    least = np.inf
+    last: tuple[Collocation, Array] | None = None
+    resolved = False
     for problem, rough in solution.elements.grids():
         found = newton(
             lambda z, problem=problem: _system(problem.state(z), weights, value),
@@ -153,19 +149,16 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
             tolerance=_STEP,
             longest_step=2.0,
         )
-        state = problem.state(found.z)
-        off = float(np.abs(state.macroscopic() - solution.macroscopic)[:LOG_T].max())
-        if found.converged and off < max(_AGREES, 10.0 * solution.error):
-            decay = tail(problem.grid, np.stack([v / np.abs(v).max() for v in (state.g, state.y)]))
-            z = found.z
-        else:
-            decay, z = _FAILED, rough
-        if decay < least:
-            best, least = (problem, z), decay
-        if least < _RESOLVED or (least < _MAY_RESOLVE and off < _FLOOR):
+        off = np.abs(problem.state(found.z).macroscopic() - solution.macroscopic)[:LOG_T].max()
+        agrees = found.converged and bool(off < max(_AGREES, solution.error))
+        if agrees or last is None:
+            last = problem, found.z if agrees else rough
+        # One grid more than it takes for the integrals: profiles want it.
+        if agrees and resolved:
             break
-    assert best is not None
-    return best
+        resolved = agrees
+    assert last is not None
+    return last
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
@@ -182,9 +175,9 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     """The flow nearest to ``start`` that meets ``condition``.
 
     Newton's method converges on one mesh, and then on the mesh of twice as many elements, in a step or two: the change
-    in ln Q, ln h, ln M and ln T_surface is the error of the coarser solution, and bounds that of the finer, which is returned.
-    The mesh is refined until the change is below ``tolerance``, or below what rounding does, which is more very close
-    to a fold.
+    in ln Q, ln h, ln M and ln T_surface is the error of the coarser solution, and bounds that of the finer, which is
+    returned. The mesh is refined until the change is below ``tolerance``, or below what rounding does, which is more
+    very close to a fold.
     """
     weights, value = np.array(condition.weights), condition.value
     coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)

@@ -12,8 +12,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from chuteflow.numerics.compiled import compiled
 from chuteflow.trajectories.tables import (
     BASE,
     BASE_ABOVE,
@@ -54,10 +54,8 @@ START = 0.05
 #: Reasons why the curve ends.
 DONE, FULL = range(2)
 
-_jit: Any = njit(cache=True, nogil=True)
 
-
-@_jit
+@compiled
 def look_up(values: Any, big_l: float, column: int) -> float:
     """One function of the table, linear between entries."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -65,7 +63,7 @@ def look_up(values: Any, big_l: float, column: int) -> float:
     return values[i, column] + (at - i) * (values[i + 1, column] - values[i, column])
 
 
-@_jit
+@compiled
 def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, float]:
     """dL/dp and dy/dp."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -78,7 +76,7 @@ def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, f
     return (1.0 - v) / p, net - y * (1.0 + 0.5 * (v + k * (1.0 - v))) / p
 
 
-@_jit
+@compiled
 def _integrands(values: Any, slope: float, p_s: float, over: float, big_l: float) -> tuple[float, float]:
     """P/nu and P du/dp."""
     root_t = math.exp(0.5 * (math.log(over + p_s) + look_up(values, big_l, POTENTIAL) - big_l))
@@ -86,7 +84,7 @@ def _integrands(values: Any, slope: float, p_s: float, over: float, big_l: float
     return over * math.exp(-big_l - look_up(values, big_l, LOG_NU)), over * work * slope * root_t
 
 
-@_jit
+@compiled
 def _advance(values: Any, slope: float, p_s: float, p_1: float, over: float, after: float, state: Any) -> None:
     """One step of the classical Runge-Kutta method in tau from overburden ``over`` to ``after``; integrals by
     Simpson."""
@@ -120,7 +118,7 @@ def _advance(values: Any, slope: float, p_s: float, p_1: float, over: float, aft
     state[S_G] += third * (g_0 * pace_0 + 4.0 * g_m * pace_m + g_1 * pace_1)
 
 
-@_jit
+@compiled
 def _surface(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, state: Any) -> None:
     """A state close to the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
@@ -142,7 +140,7 @@ def _surface(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, 
     state[S_G] = 0.5 * g * over
 
 
-@_jit
+@compiled
 def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
     """The invariant region in which a state lies: from there on B keeps its sign (docs/theory/enumeration.md)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -166,18 +164,18 @@ def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
     return FREE
 
 
-@_jit
+@compiled
 def _place(big_l: float) -> float:
     """L as distances count it."""
     return big_l if big_l > _DILUTE else _DILUTE + _DILUTE_WEIGHT * (big_l - _DILUTE)
 
 
-@_jit
+@compiled
 def _distance(one: Any, other: Any, per_flux: float) -> float:
     return math.hypot(_place(one[S_L]) - _place(other[S_L]), (one[S_Y] - other[S_Y]) * per_flux)
 
 
-@_jit
+@compiled
 def _limited_slope(before: float, after: float, d_before: float, d_after: float) -> float:
     """Slope at a point between two secants that keeps the interpolant monotonic (Fritsch & Butland 1984)."""
     one, two = before / d_before, after / d_after
@@ -187,7 +185,7 @@ def _limited_slope(before: float, after: float, d_before: float, d_after: float)
     return (w_1 + w_2) / (w_1 / one + w_2 / two)
 
 
-@_jit
+@compiled
 def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, out: Any) -> None:
     """The state at ``t`` of the way from position j of the curve to the next: a monotonic cubic."""
     d = length[j]
@@ -202,7 +200,7 @@ def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, o
         out[q] = rows[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
 
 
-@_jit
+@compiled
 def _grown(array: Any, size: int) -> Any:
     """The array with room for ``size`` rows at least."""
     if size <= len(array):
@@ -213,7 +211,7 @@ def _grown(array: Any, size: int) -> Any:
     return out
 
 
-@_jit
+@compiled
 def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
     """Join the ``count`` zeros on the boundary of a cell, in cyclic order, in pairs: of the two ways to join
     neighbours the one with the shorter lines."""
@@ -234,7 +232,7 @@ def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
         links[two, 0 if links[two, 0] < 0 else 1] = one
 
 
-@_jit
+@compiled
 def carry(
     values: Any,
     bounds: Any,
@@ -485,7 +483,7 @@ def carry(
     )
 
 
-@_jit
+@compiled
 def walk(links: Any) -> tuple[Any, Any]:
     """The zeros in the order of the lines that they form: indices (Z,), and where each line begins (lines + 1,).
 
@@ -513,7 +511,7 @@ def walk(links: Any) -> tuple[Any, Any]:
     return order, starts[: lines + 1]
 
 
-@_jit
+@compiled
 def trace_back(states: Any, came_from: Any, place: float, row: int) -> Any:
     """L and y in all rows down to ``row`` of the trajectory that passes its curve at ``place``, between two states as a
     rule, (row + 1, 2)."""

@@ -24,7 +24,7 @@ from typing import Protocol, Self, cast
 
 import numpy as np
 
-from chuteflow.numerics.chebyshev import Array, Grid, grid, interpolation_matrix, refinement
+from chuteflow.numerics.chebyshev import AnyGrid, Array, grid, interpolation_matrix, refinement
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
 from chuteflow.steady.model import IMAGINARY_STEP, LOSS, WORK
@@ -225,7 +225,7 @@ def _bordered(jacobian: Array, gradient: Array) -> Array:
     return np.concatenate([jacobian, gradient[None]])
 
 
-def _largest(g: Grid, values: Array) -> Array:
+def _largest(g: AnyGrid, values: Array) -> Array:
     """The row (n+1,) that interpolates nodal values at the place in [0, 1] where ``values`` are largest."""
     fine = max(_SAMPLES, 2 * g.degree)
     sampled = refinement(g.degree, fine) @ values

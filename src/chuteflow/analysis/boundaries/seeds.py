@@ -26,7 +26,7 @@ from chuteflow.analysis.ranges import Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
-from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, Collocation
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition as SolverCondition
 from chuteflow.steady.solver import Solution, resolve
@@ -90,16 +90,22 @@ def on_families(
     """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
     far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
     for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in family.solutions]
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
         if isinstance(condition, Fold):
             for turn in family.turns(condition.which, tolerance):
-                yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
+                if turn.point.solution.problem.breaks == WHOLE:
+                    yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
             yield from _zeros(sweep, condition, value, samples, tolerance)
         for i, chord in _nearest(samples, condition):
             point = _beside(sweep, condition, value, samples[i].solution, chord, reach, tolerance)
             if point is not None:
                 yield point
+
+
+def _in_one_piece(family: TracedFamily) -> list[Solution]:
+    """The flows of a family that one grid resolves: boundaries are followed on such."""
+    return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
 
 
 def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
@@ -272,7 +278,7 @@ def along_families(
 ) -> Iterator[BoundaryPoint]:
     """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
     for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in family.solutions]
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
