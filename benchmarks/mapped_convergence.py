@@ -164,7 +164,7 @@ def coldest() -> None:
 
 def overburden_when_cold() -> None:
     """Degrees that the overburden method takes for the same flows."""
-    say("N of the overburden method at 1e-10, half-line: ")
+    say("N of the Chebyshev grid of an overburden flow, half-line:")
     for temperature in (1.0, 0.1, 0.04, 0.01, 0.001):
         (flow,) = flows(CHUTES["half-line"], T_surface=temperature)
         say(f"    T_inf = {temperature:<8g}N = {flow.solution.problem.degree}")

@@ -9,7 +9,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chuteflow.analysis.families import chains, families
+from chuteflow.analysis.families import families
+from chuteflow.trajectories.refining import carry_down
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def forget() -> None:
 def forget_search() -> None:
     """Forget the families of the last chutes, and nothing else."""
     families.cache_clear()
-    chains.cache_clear()
+    carry_down.cache_clear()
 
 
 def _processor_time() -> float:

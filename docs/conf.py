@@ -25,6 +25,7 @@ extensions = [
     "tables",
     "pictures",
     "convergence",
+    "profiles",
     "present",
     "offline",
 ]

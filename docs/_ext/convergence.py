@@ -1,8 +1,5 @@
 """The directive ``coefficients``: how the series of the two methods converge, drawn at build."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 from docutils import nodes
 from package import FromPackage
@@ -21,6 +18,7 @@ _FLUX = 3.0
 _ROUNDING = 1e-14
 #: Degree to which a smooth overburden solution is solved again, to show where its coefficients meet rounding.
 _FINE = 80
+_FILE = "coefficients.png"
 _SAID = (
     "Size of the Chebyshev coefficients against their number, for flows A, B and C: those of the overburden method "
     "fall fastest; those of the mapped method slowly in flow C, and with k = 1 hardly at all"
@@ -32,15 +30,7 @@ class Coefficients(FromPackage):
 
     def run(self) -> list[nodes.Node]:
         """The picture; in a quick build what it shows."""
-        self.note_package()
-        if self.quick:
-            return [nodes.paragraph(_SAID, _SAID)]
-        folder = Path(self.env.doctreedir).parent / ".pictures" / self.env.docname
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / "coefficients.png"
-        write_figure(drawn(), path)
-        page = Path(self.env.doc2path(self.env.docname)).parent
-        return [nodes.image(uri=Path(os.path.relpath(path, page)).as_posix(), alt=_SAID)]
+        return [self.image(_FILE, _SAID, lambda folder: write_figure(drawn(), folder / _FILE))]
 
 
 def drawn():

@@ -1,6 +1,7 @@
 """What the extensions share: pages that are made from the package are read anew when the package changes."""
 
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from docutils import nodes
@@ -24,6 +25,17 @@ class FromPackage(SphinxDirective):
         """Let the page depend on every module, and on what makes the page of them."""
         for path in [*Path(chuteflow.__file__).parent.rglob("*.py"), *Path(__file__).parent.glob("*.py")]:
             self.env.note_dependency(str(path))
+
+    def image(self, file: str, said: str, make: Callable[[Path], None]) -> nodes.Element:
+        """The picture in ``file`` that ``make`` draws into a folder; in a quick build the words on what it shows."""
+        self.note_package()
+        if self.quick:
+            return nodes.paragraph(said, said)
+        folder = Path(self.env.doctreedir).parent / ".pictures" / self.env.docname
+        folder.mkdir(parents=True, exist_ok=True)
+        make(folder)
+        page = Path(self.env.doc2path(self.env.docname)).parent
+        return nodes.image(uri=Path(os.path.relpath(folder / file, page)).as_posix(), alt=said)
 
     def table(self, heading: Sequence[Cell], rows: Iterable[Sequence[Cell]], widths: Sequence[int]) -> nodes.table:
         """A table whose cells are inline markup of the page, or nodes."""

@@ -40,22 +40,19 @@ class Picture(FromPackage):
 
     def drawn(self, arguments: list[str], file: str, alternative: str) -> nodes.Element:
         """The picture in ``file`` that the command of the arguments makes; in a quick build its description."""
-        self.note_package()
-        if self.quick:
-            return nodes.paragraph(alternative, alternative)
-        folder = Path(self.env.doctreedir).parent / ".pictures" / self.env.docname
-        folder.mkdir(parents=True, exist_ok=True)
-        before = Path.cwd()
-        os.chdir(folder)
-        try:
-            with redirect_stdout(StringIO()):
-                code = main(arguments)
-        finally:
-            os.chdir(before)
-        if code:
-            raise self.error(f"chuteflow {shlex.join(arguments)} ended with exit code {code}")
-        page = Path(self.env.doc2path(self.env.docname)).parent
-        return nodes.image(uri=Path(os.path.relpath(folder / file, page)).as_posix(), alt=alternative)
+
+        def make(folder: Path) -> None:
+            before = Path.cwd()
+            os.chdir(folder)
+            try:
+                with redirect_stdout(StringIO()):
+                    code = main(arguments)
+            finally:
+                os.chdir(before)
+            if code:
+                raise self.error(f"chuteflow {shlex.join(arguments)} ended with exit code {code}")
+
+        return self.image(file, alternative, make)
 
 
 class PaperFigure(Picture):
