@@ -47,6 +47,8 @@ FREE, HOT, LOW_FLUX, COLD = range(4)
 _DILUTE, _DILUTE_WEIGHT = -7.0, 0.1
 #: States are no longer advanced where y is below this multiple of the scale of fluxes, or L above this.
 _COLDEST, _DENSEST = -8.0, 55.0
+#: Places between two states at which the residual is looked at.
+_BETWEEN = 5
 #: Trajectories inserted into one interval in one row at most.
 _MOST_INSERTED = 12
 #: The series at the surface of the half-line is used up to this share of T.
@@ -201,6 +203,46 @@ def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, o
 
 
 @compiled
+def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: Any, length: Any) -> bool:
+    """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
+    where it does along the cubic through the two states, or comes half of the way to it."""
+    d = length[j]
+    slopes = np.empty((2, 2))
+    for q in range(2):
+        secant = (rows[j + 1, q] - rows[j, q]) / d
+        slopes[0, q] = slopes[1, q] = secant
+        if j > 0 and open_[j - 1]:
+            beside = (rows[j, q] - rows[j - 1, q]) / length[j - 1]
+            slopes[0, q] = (beside * d + secant * length[j - 1]) / (d + length[j - 1])
+        if j + 2 < n and open_[j + 1]:
+            beside = (rows[j + 2, q] - rows[j + 1, q]) / length[j + 1]
+            slopes[1, q] = (beside * d + secant * length[j + 1]) / (d + length[j + 1])
+    changes = 0
+    before, last = residual[j], residual[j + 1]
+    least = min(abs(before), abs(last))
+    nearest = least
+    for c in range(1, _BETWEEN + 1):
+        t = c / (_BETWEEN + 1.0)
+        big_l = y = 0.0
+        for q in range(2):
+            rise = rows[j + 1, q] - rows[j, q]
+            bend = (1.0 - t) * (slopes[0, q] * d - rise) - t * (slopes[1, q] * d - rise)
+            value = rows[j, q] + t * rise + t * (1.0 - t) * bend
+            if q == S_L:
+                big_l = value
+            else:
+                y = value
+        here = y - look_up(values, big_l, BASE)
+        changes += int((here >= 0.0) != (before >= 0.0))
+        nearest = min(nearest, abs(here))
+        before = here
+    changes += int((last >= 0.0) != (before >= 0.0))
+    if (residual[j] >= 0.0) == (last >= 0.0):
+        return changes > 0 or nearest < 0.5 * least
+    return changes > 1
+
+
+@compiled
 def _grown(array: Any, size: int) -> Any:
     """The array with room for ``size`` rows at least."""
     if size <= len(array):
@@ -320,20 +362,7 @@ def carry(
             if length[j] > delta:
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
             elif length[j] > finest:
-                # A pair of zeros may hide where the residual turns towards zero between the two.
-                left = right = secant = (residual[j + 1] - residual[j]) / length[j]
-                if j > 0 and open_[j - 1]:
-                    left = (residual[j + 1] - residual[j - 1]) / (length[j] + length[j - 1])
-                if j + 2 < n and open_[j + 1]:
-                    right = (residual[j + 2] - residual[j]) / (length[j] + length[j + 1])
-                sign = 1.0 if residual[j] > 0.0 else -1.0
-                if residual[j] * residual[j + 1] > 0.0:
-                    if sign * left < 0.0 < sign * right:
-                        # The parabola with these slopes at the ends.
-                        dip = -left * right * length[j] / (right - left)
-                        least = min(sign * residual[j], sign * residual[j + 1])
-                        wanted[j] = 1 if sign * dip > 0.5 * least else 0
-                elif secant * left < 0.0 or secant * right < 0.0:
+                if _hides_zeros(values, current, residual, j, n, open_, length):
                     wanted[j] = 1
             extra += wanted[j]
         if total + n + extra > most:
