@@ -97,7 +97,7 @@ def test_trajectories_are_those_of_another_integrator(chute):
 @pytest.mark.parametrize("chute", WINDING, ids=str)
 def test_a_finer_grid_shows_the_same_flows(chute):
     problem = model(chute)
-    finer = replace(REFINEMENT, delta=0.2, finest=0.0125, per_decade=20.0)
+    finer = replace(REFINEMENT, delta=0.1, finest=0.006, lengths=0.2, per_decade=20.0)
     counts = [
         [crossings_of(carry_down(problem, 1e-3, 1e5, 25.0, refinement), mass) for mass in (2.0, 7.5, 12.0, 19.0, 24.0)]
         for refinement in (REFINEMENT, finer)
@@ -136,7 +136,7 @@ def test_a_grid_that_grows_too_large_says_where_it_ends():
 @pytest.mark.slow
 def test_on_random_chutes_the_flows_are_those_of_a_finer_grid():
     random = np.random.default_rng(11)
-    finer = replace(REFINEMENT, delta=0.2, finest=0.0125, per_decade=20.0)
+    finer = replace(REFINEMENT, delta=0.1, finest=0.006, lengths=0.2, per_decade=20.0)
     found = 0
     for _ in range(DRAWN):
         chute, mass = winding(random), float(random.uniform(6.0, 29.5))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from chuteflow.analysis.existence import imbalance
-from chuteflow.analysis.families import TracedFamily, traced_families
+from chuteflow.analysis.families import TracedFamily, search, traced_families
 from chuteflow.analysis.paths import Chord, Point, find_zero
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
 from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
@@ -75,7 +75,7 @@ def curve(
     return Curve(
         chute=chute,
         branches=tuple(branches),
-        searched=Searched((within.coldest, within.hottest), within.deepest),
+        searched=Searched((within.coldest, within.hottest), min(within.deepest, search(problem, within).deepest)),
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
     )

@@ -82,7 +82,7 @@ def flows(
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
-        searched=Searched((found.within.coldest, found.within.hottest), found.within.deepest),
+        searched=Searched((found.within.coldest, found.within.hottest), min(found.within.deepest, found.carried)),
         tolerance=tolerance,
         reason=None
         if found.solutions

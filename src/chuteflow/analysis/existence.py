@@ -22,9 +22,9 @@ def reason_for_none(model: Model, families: Sequence[Array], which: int, value: 
     """One sentence on why no flow was found, given the quantities (k, 4) of the families that were."""
     if families:
         spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in families]
-        ranges = " and ".join(f"{low:.4g} to {high:.4g}" for low, high in sorted(map(tuple, spans)))
+        ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
-        return f"no flow has {name} = {value:g}: those of this chute have {ranges} ({_searched(within)})"
+        return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"
     return f"{imbalance(model)} ({_searched(within)})"
 
 

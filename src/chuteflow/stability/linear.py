@@ -35,6 +35,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import Base
+from chuteflow.theory.constitutive import Coefficients
 from chuteflow.theory.transport import Fields, Grains, Motion, Vector, base_conditions, motion
 
 #: Order of the unknowns n, u, v, w, tau, each at all nodes from the top to the base, with omega for the first n.
@@ -143,9 +144,8 @@ def operator(base: Base) -> Operator:
     parts, weights = zip(*(_linearised(base, kx, ky) for kx, ky in _SAMPLES), strict=True)
     fit = np.linalg.inv(_monomials(*_SAMPLES.T).T)
     powers: Complex = np.tensordot(np.round(fit, 12).astype(complex), np.array(parts), axes=1)
-    at_rest = steady_motion(base)
     flux = base.profile.granular_temperature[0] * _conductivity(base)
-    return Operator(base, powers, weights[0], (_viscosity(base, at_rest), flux))
+    return Operator(base, powers, weights[0], (_viscosity(base), flux))
 
 
 def _steady(base: Base) -> Fields:
@@ -207,14 +207,21 @@ def _add_load(base: Base, matrix: Complex, kx: float, ky: float) -> None:
     )
 
 
-def _viscosity(base: Base, at_rest: Motion) -> float:
-    """eta at the top: the shear stress there over the shear rate."""
-    return float(-at_rest.pressure[0][2][0] / at_rest.shear[0][2][0])
+def _viscosity(base: Base) -> float:
+    """eta at the top."""
+    g, root_t = _at_top(base)
+    return float(g.viscosity[0]) * root_t
 
 
 def _conductivity(base: Base) -> float:
     """K at the top."""
+    g, root_t = _at_top(base)
+    return float(g.conductivity[0]) * root_t
+
+
+def _at_top(base: Base) -> tuple[Coefficients, float]:
+    """The coefficients of the law, and sqrt(T), at the top."""
     chute, law = base.flow.chute, base.flow.law
     nu = base.profile.volume_fraction[:1]
     g = law.coefficients(nu, 1.0 - nu / law.densest, chute.restitution, chute.slope)
-    return float(g.conductivity[0] * np.sqrt(base.profile.granular_temperature[0]))
+    return g, float(np.sqrt(base.profile.granular_temperature[0]))

@@ -361,9 +361,8 @@ def carry(
                 continue
             if length[j] > delta:
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-            elif length[j] > finest:
-                if _hides_zeros(values, current, residual, j, n, open_, length):
-                    wanted[j] = 1
+            elif length[j] > finest and _hides_zeros(values, current, residual, j, n, open_, length):
+                wanted[j] = 1
             extra += wanted[j]
         if total + n + extra > most:
             status = FULL

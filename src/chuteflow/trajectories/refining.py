@@ -46,11 +46,11 @@ class Refinement:
         most: states kept at most, 48 bytes each; beyond, the search ends at the depth that it has reached, and says so.
     """
 
-    delta: float = 0.4
-    finest: float = 0.025
+    delta: float = 0.2
+    finest: float = 0.0125
     per_decade: float = 12.0
     step: float = 0.25
-    lengths: float = 0.6
+    lengths: float = 0.3
     most: int = 1_200_000
 
 
