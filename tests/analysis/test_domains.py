@@ -6,8 +6,10 @@ import pytest
 from chuteflow import Chute, InputError, curve, domain, flows, hot
 from chuteflow.analysis.domains import CODES, exists_at
 from chuteflow.analysis.domains.columns import Part, alike
+from chuteflow.analysis.domains.fan import Base, fan
 from chuteflow.analysis.domains.kinds import _monotonic_pieces, _most
 from chuteflow.analysis.domains.plane import code
+from chuteflow.analysis.ranges import Range
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
 
@@ -258,3 +260,9 @@ def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
     pieces = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
     assert _most(pieces) == 3
     assert _most(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
+
+
+def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():
+    chute = Chute(0.38750000000000007, 0.7901041666666666, 0.8, 0.6)
+    found = fan(chute, [Base.of(chute)], Range.checked((1e-3, 1e5), 30.0), np.array([]), 12)
+    assert np.isfinite(found.log_mass).all()

@@ -237,17 +237,14 @@ def test_the_commands_start_as_many_workers(monkeypatch, tmp_path):
     assert counts == [3, 3, 3, 3]
 
 
-def environment():
-    return {name: os.environ.get(name) for name in threads.VARIABLES}, signal.getsignal(signal.SIGINT)
-
-
 def test_workers_have_one_thread_and_leave_interrupts_to_their_parent():
     before = dict(os.environ)
     with processes.worker_pool(1) as pool:
-        variables, handler = pool.submit(environment).result()
+        variables = [pool.submit(os.getenv, name).result() for name in threads.VARIABLES]
+        handler = pool.submit(signal.getsignal, signal.SIGINT).result()
         blocked = pool.submit(signal.pthread_sigmask, signal.SIG_BLOCK, []).result()
         assert dict(os.environ) == before
-    assert set(variables.values()) == {"1"}
+    assert set(variables) == {"1"}
     assert handler == signal.SIG_IGN
     # Held back from before the first line of Python, so that importing is not interrupted either.
     assert signal.SIGINT in blocked

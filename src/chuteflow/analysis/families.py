@@ -331,18 +331,16 @@ class TracedFamily:
         return turns(self.points, which, tolerance)
 
     def at(self, places: Array, tolerance: float) -> list[Point]:
-        """Points at ``places`` of the arclength, each solved to ``tolerance``.
-
-        Raises:
-            SolveError: where one could not be solved.
-        """
+        """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
         out = []
         for i, place in zip(index.tolist(), places.tolist(), strict=True):
             chord = Chord(self.points[i], self.points[i + 1], tolerance)
-            point = chord.at((place - float(self.arclength[i])) / chord.length)
+            sigma = (place - float(self.arclength[i])) / chord.length
+            point = chord.at(sigma)
             if point is None:
-                raise SolveError("a flow of a branch could not be solved: ask for a larger tolerance")
+                # The nearer of the points that are known is as good to draw.
+                point = chord.first if sigma < 0.5 else chord.last
             out.append(point if point.tangent @ chord.direction > 0.0 else point.reversed())
         return out
 

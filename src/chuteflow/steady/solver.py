@@ -29,7 +29,7 @@ _FINE_STEP = 2e-6
 #: The hold-up fixes a flow where it is this part of the change along the branch.
 _STEEP = 1e-3
 #: A grid resolves a flow where its integrals agree to this.
-_AGREES = 3e-12
+_AGREES = 1e-11
 
 
 class Status(Enum):

@@ -163,7 +163,8 @@ def _with_increments(values: Array) -> Array:
 
 
 def _interpolated(table: Array, big_l: Array) -> Array:
-    position = np.minimum(np.maximum((big_l - _LOW) * _SCALE, 0.0), _ENTRIES - 2.0)
+    # Of a state that ran off, which is ended by whoever made it, any entry will do: fmax and fmin leave no NaN.
+    position = np.fmin(np.fmax((big_l - _LOW) * _SCALE, 0.0), _ENTRIES - 2.0)
     index = position.astype(np.intp)
     rows = table.take(index, axis=1)
     half = len(table) // 2
@@ -213,9 +214,9 @@ def _grow(problem: Model, bases: Sequence[Base], temperature: Array, gaps: Array
         before = state[:, moving]
         with np.errstate(over="ignore", invalid="ignore"):
             after = _runge_kutta_step(derivative, before, _STEP)
-        ended = after[0] >= end
-        if ended.any():
-            after[:, ended] = _last_step(derivative, before[:, ended], after[:, ended], end)
+            ended = after[0] >= end
+            if ended.any():
+                after[:, ended] = _last_step(derivative, before[:, ended], after[:, ended], end)
         _p, big_l, y, _ = after
         cold = ~(y >= floor) | (big_l > _HIGH)
         # A cold trajectory may run off to infinity within a step.
