@@ -73,7 +73,7 @@ def started(command, folder):
 def left(session):
     """Processes of a session that are still there."""
     listed = subprocess.run(
-        ["ps", "-o", "stat=,args=", "-s", str(session)], capture_output=True, text=True, check=False
+        ["ps", "-ww", "-o", "stat=", "-o", "args=", "-s", str(session)], capture_output=True, text=True, check=False
     )
     return [line for line in listed.stdout.splitlines() if not line.startswith("Z")]
 
