@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, FlowSet, InputError, flows, load, save
-from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
+from chuteflow.steady.collocation import LOG_Q, LOG_T
 from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import (
@@ -15,7 +15,6 @@ from chuteflow.steady.solver import (
     checked_tolerance,
     resolve,
     solve,
-    solve_many,
 )
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
@@ -57,21 +56,11 @@ def test_a_neighbouring_flow_is_reached_from_a_flow():
     np.testing.assert_allclose(second.macroscopic, found.solution.macroscopic, atol=1e-10)
 
 
-def test_many_flows_are_the_same_as_one_by_one():
-    starts = [flow.solution for flow in flows(PAPER, Q=3.0)]
-    conditions = [Condition.fix(LOG_M, 1.01 * np.exp(s.macroscopic[LOG_M])) for s in starts]
-    many = solve_many([s.elements for s in starts], conditions)
-    for s, condition, together in zip(starts, conditions, many, strict=True):
-        alone = solve(s.elements, condition)
-        assert together.converged
-        np.testing.assert_allclose(together.macroscopic, alone.macroscopic, atol=2e-11)
-
-
 def test_a_poor_start_leads_to_a_flow_or_to_none():
     good = flows(PAPER, Q=3.0)[0].solution.elements
     ends = good.ends + 1.5 * np.sin(9.0 * good.breaks)[:, None]
     condition = Condition.fix(LOG_T, 7.0)
-    first, second = solve_many([good, replace(good, ends=ends)], [condition] * 2)
+    first, second = (solve(start, condition) for start in (good, replace(good, ends=ends)))
     assert first.converged
     assert second.converged or second.status is Status.NO_CONVERGENCE
     if second.converged:

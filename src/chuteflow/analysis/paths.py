@@ -133,7 +133,7 @@ class Chord:
     def sharp_slope(self, point: Point) -> Array:
         """The same to rounding: at the flow itself, not at the last but one step of Newton's method."""
         found = point.solution.elements.direction(self.direction)
-        return self.slope(point) if found is None else found[0] * self.length
+        return self.slope(point) if found is None else found * self.length
 
 
 def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point]:

@@ -172,29 +172,15 @@ class Elements:
             Elements(self.model, self.stretch, self.breaks, ends, slopes, mu), quantities, rates, errors, step
         )
 
-    def direction(self, weights: Array) -> tuple[Array, Elements] | None:
-        """The change along the branch for which the macroscopic quantities, times ``weights`` (4,), change by 1.
-
-        Returns the derivatives (4,) of ln Q, ln h, ln M and ln T_surface, and those of the unknowns, in the place of
-        the unknowns; None where the condition turns.
-        """
-        change, ends, slopes = np.empty(4), np.empty_like(self.ends), np.empty_like(self.slopes)
-        mu, found = kernel.direction(
+    def direction(self, weights: Array) -> Array | None:
+        """The change (4,) of ln Q, ln h, ln M and ln T_surface along the branch, for which they, times ``weights``
+        (4,), change by 1; None where the condition turns."""
+        change = np.empty(4)
+        found = kernel.direction(
             self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
-            self.ends, self.slopes, self.log_mass, weights, change, ends, slopes,
+            self.ends, self.slopes, self.log_mass, weights, change,
         )  # fmt: skip
-        return (change, Elements(self.model, self.stretch, self.breaks, ends, slopes, mu)) if found else None
-
-    def moved(self, along: Elements, length: float) -> Elements:
-        """The unknowns moved by ``length`` times their change ``along`` a branch."""
-        return Elements(
-            self.model,
-            self.stretch,
-            self.breaks,
-            self.ends + length * along.ends,
-            self.slopes + length * along.slopes,
-            self.log_mass + length * along.log_mass,
-        )
+        return change if found else None
 
 
 @dataclass(frozen=True, eq=False)

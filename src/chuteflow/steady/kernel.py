@@ -409,13 +409,10 @@ def iterate(
 @compiled
 def direction(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
-    rows: Any, out: Any, ends_out: Any, slopes_out: Any,
-) -> tuple[float, bool]:  # fmt: skip
-    """The change along the branch for which the condition ``rows`` (4,) of the macroscopic quantities changes by 1.
-
-    Fills ``out`` (4,), the changes of ln Q, ln h, ln M and ln T_surface, ``ends_out`` and ``slopes_out``; returns the
-    change of mu, and whether there is one.
-    """
+    rows: Any, out: Any,
+) -> bool:  # fmt: skip
+    """The changes ``out`` (4,) of ln Q, ln h, ln M and ln T_surface along the branch for which the condition ``rows``
+    (4,) of them changes by 1; whether there are any."""
     count = len(slopes)
     local = np.empty((count, 2 * STAGES, 4))
     by_ends = np.zeros((2, count + 1, 3))
@@ -431,11 +428,9 @@ def direction(
         gauss, integrals, breaks, chute, ends, slopes, local, quantities, by_ends, by_slopes, rows,
         np.array([0.0, 1.0]), mass / (mass + chute[1]), change_ends, change_slopes,
     ):  # fmt: skip
-        return 0.0, False
-    ends_out[:] = change_ends[1, : count + 1]
-    slopes_out[:] = change_slopes[1]
+        return False
     _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[1], change_slopes[1], out)
-    return change_ends[1, count + 1, 0], math.isfinite(out.sum())
+    return math.isfinite(out.sum())
 
 
 @compiled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -195,13 +194,6 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
             return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
         coarse = fine
     return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
-
-
-def solve_many(
-    starts: Sequence[Elements], conditions: Sequence[Condition], tolerance: float = TOLERANCE
-) -> list[Solution]:
-    """As :func:`solve`, for many flows."""
-    return [solve(start, condition, tolerance) for start, condition in zip(starts, conditions, strict=True)]
 
 
 def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
