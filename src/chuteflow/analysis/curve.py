@@ -114,7 +114,7 @@ def _folds(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tup
 def _changes(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which the density turns inverted, or the interior another kind, with their arclengths."""
     points, at = family.points, family.arclength
-    rough = np.array([rough_kinds(point.solution) for point in points])
+    rough = rough_kinds([point.solution for point in points])
     for column, (kind, quantity) in enumerate(_CHANGES):
         # What is near to zero is told by the flow itself.
         values = rough[:, column].copy()

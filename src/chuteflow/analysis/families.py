@@ -20,9 +20,11 @@ from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
+#: So many rough flows further out are tried where a first or last one leads nowhere.
+_OUTWARD = 16
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
-_TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
+_TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
 #: Reaches over which the direction of a rough branch is looked for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
@@ -33,8 +35,11 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 #: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
-#: One flow is solved at once where the quantity changes by more than this along the branch, per length.
-_STEEP = 0.15
+#: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
+#: least the second; and there by more than so many times of what the rough flow was wrong by.
+_STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
+#: Where the flows among rough ones are not found, they are looked for between rough ones so much further away.
+_FURTHER = (0.1, 0.5, np.inf)
 #: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
 #: where it changes by more than the second along the branch, per length.
 _NEARLY, _FIXES = 0.01, 1e-3
@@ -106,34 +111,57 @@ class Family:
             return None
         return point
 
-    def _solved_from(self, begin: int, end: int, tolerance: float) -> list[Point]:
+    def _solved_near(self, places: list[int], tolerance: float) -> list[Point]:
+        """The flows at some rough ones in order, without those that lead nowhere."""
         found: list[Point] = []
-        for i in self._spaced(begin, end):
+        for i in places:
             # Where one rough flow leads nowhere its neighbour may.
-            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if begin <= k <= end)
+            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if 0 <= k < len(self.macroscopic))
             point = next((point for point in tries if point is not None), None)
             if point is not None and not (found and _is_behind(point, found[-1])):
                 found.append(point)
         return found
 
-    def points(self, begin: int, end: int, tolerance: float) -> list[Point]:
-        """Points from rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
+    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
+        """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
+        them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
+        it.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
-        found = self._solved_from(begin, end, tolerance)
-        if not found:
-            raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
-        return refined(found, tolerance)
+
+        def agrees(i: int) -> Point | None:
+            point = self.solved(i, tolerance)
+            off = self.macroscopic[i, which] - target
+            return point if point is not None and (point.m[which] >= target) == (off >= 0.0) else None
+
+        def outermost(places: list[int]) -> tuple[int, Point]:
+            found = next(((i, point) for i in places if (point := agrees(i)) is not None), None)
+            if found is None:
+                raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
+            return found
+
+        last_place = len(self.macroscopic) - 1
+        inward = range(begin + 1, end)
+        begin, first = outermost([*range(begin, max(begin - _OUTWARD, -1), -1), *(inward if begin == 0 else ())])
+        end, last = outermost(
+            [*range(end, min(end + _OUTWARD, last_place + 1)), *(inward[::-1] if end == last_place else ())]
+        )
+        inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
+        while inner and _is_behind(last, inner[-1]):
+            inner.pop()
+        return refined([first, *inner, last], tolerance)
 
     def traced(self, tolerance: float) -> list[TracedFamily]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
         if len(inside) < 2:
             return []
-        found = self._solved_from(int(inside[0]), int(inside[-1]), tolerance)
-        if self.rough.closed and found:
+        found = self._solved_near(self._spaced(int(inside[0]), int(inside[-1])), tolerance)
+        if self.rough.closed and len(inside) == len(self.macroscopic) and found:
+            while len(found) > 1 and _is_behind(found[0], found[-1]):
+                found.pop()
             found.append(found[0])
         pieces: list[list[Point]] = [found[:1]]
         for one, other in pairwise(found):
@@ -142,7 +170,7 @@ class Family:
             except SolveError:
                 pieces.append([other])
         ends = [LOST] * (2 * len(pieces))
-        if self.rough.closed and len(pieces) == 1:
+        if len(pieces) == 1 and found[0] is found[-1]:
             ends = [CLOSED, CLOSED]
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
@@ -195,14 +223,12 @@ def crossings(
     found: list[Solution] = []
     lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
-        single = _single(family, which, target, off, begin, end, tolerance)
-        if single is not None:
-            found.append(single)
-            continue
-        try:
-            found += _among(family, which, target, begin, end, tolerance)
-        except SolveError:
+        single = _solve_single(family, which, target, off, begin, end, tolerance)
+        solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
+        if solved is None:
             lost += [m[i] for i in changes.tolist() if begin <= i < end]
+        else:
+            found += solved
     return found, lost
 
 
@@ -231,34 +257,57 @@ def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
     return runs
 
 
-def _single(
+def _solve_single(
     family: Family, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
 ) -> Solution | None:
     """The one flow among rough flows along which the quantity rises or falls steeply; None where it may turn."""
-    steps, lengths = np.diff(off[begin : end + 1]), np.diff(family.arclength[begin : end + 1])
-    steep = np.abs(steps) > _STEEP * lengths
-    if not steep.all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        return None
     change = np.flatnonzero((off[begin:end] >= 0.0) != (off[begin + 1 : end + 1] >= 0.0))
-    if len(change) != 1:
+    slopes = _slopes(off, family.arclength, begin, end)
+    if len(change) != 1 or not (np.abs(slopes) > _STEEP).all() or not ((slopes > 0.0).all() or (slopes < 0.0).all()):
         return None
     i = begin + int(change[0])
     nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
     weights = np.zeros(4)
     weights[which] = 1.0
     point = point_at(family.rough.start(nearer), weights, target, tolerance)
-    if point is None or abs(point.tangent[which]) < 0.5 * _STEEP:
+    if point is None or abs(point.tangent[which]) < 0.5 * np.abs(slopes).min():
         return None
     fraction = off[i] / (off[i] - off[i + 1])
     there = family.macroscopic[i] + fraction * (family.macroscopic[i + 1] - family.macroscopic[i])
     spacing = family.arclength[i + 1] - family.arclength[i]
-    return point.solution if np.linalg.norm(point.m - there) < _ROUGH + _ASTRAY * spacing else None
+    wrong = float(np.linalg.norm(point.m - there))
+    sure = wrong < _ROUGH + _ASTRAY * spacing and np.abs(slopes).min() * max(_OVER, spacing) > _SURELY * abs(
+        float((point.m - there)[which] - point.tangent[which] * ((point.m - there) @ point.tangent))
+    )
+    return point.solution if sure else None
 
 
-def _among(family: Family, which: int, target: float, begin: int, end: int, tolerance: float) -> list[Solution]:
+def _slopes(off: Array, arclength: Array, begin: int, end: int) -> Array:
+    """Of a quantity along the branch at places from ``begin`` to ``end``, between neighbours that are not too near."""
+    places = np.arange(begin, end + 1)
+    before = np.maximum(np.searchsorted(arclength, arclength[places] - 0.5 * _OVER, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(arclength, arclength[places] + 0.5 * _OVER), len(off) - 1)
+    return (off[after] - off[before]) / np.maximum(arclength[after] - arclength[before], 1e-300)
+
+
+def _solve_among(
+    family: Family, which: int, target: float, begin: int, end: int, tolerance: float
+) -> list[Solution] | None:
     """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
-    pieces."""
-    points = family.points(begin, end, tolerance)
+    pieces. None where they are not found."""
+    length = family.arclength
+    for further in _FURTHER:
+        try:
+            points = family.points(begin, end, which, target, tolerance)
+            return _on_path(points, which, target, tolerance)
+        except SolveError:
+            begin = max(int(np.searchsorted(length, length[begin] - further)) - 1, 0)
+            end = min(int(np.searchsorted(length, length[end] + further)), len(length) - 1)
+    return None
+
+
+def _on_path(points: list[Point], which: int, target: float, tolerance: float) -> list[Solution]:
+    """The flows on a path of solved points at which a quantity takes a value."""
     placed = [(float(i), point) for i, point in enumerate(points)]
     turning = turns(points, which, tolerance)
     placed += [(turn.place, turn.point) for turn in turning]
@@ -268,9 +317,6 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
             found.append(_between(Chord(one, other, tolerance), which, target))
-    seen = family.macroscopic[[begin, end], which] - target
-    if len(found) % 2 != ((seen[0] >= 0.0) != (seen[1] >= 0.0)) and not turning:
-        raise SolveError("a flow seen in the search was not found on its branch")
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution

@@ -58,13 +58,13 @@ class Refinement:
 REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
-_THIN, _THIN_STEP, _LEAST = 80, 0.25, 5e-10
+_THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
 
 
 @dataclass(frozen=True, eq=False)
 class RoughBranch:
     """The zeros of B along one branch of flows: their places (k,) among those of ``grid``, and their ``macroscopic``
-    quantities ln Q, ln h, ln M, ln T_surface (k, 4), to about 1e-3. ``closed`` where the last is next to the first."""
+    quantities ln Q, ln h, ln M, ln T_surface (k, 4), to about 1e-3. Where it is ``closed`` the last is the first."""
 
     grid: TrajectoryGrid
     zeros: Index
@@ -131,6 +131,8 @@ class TrajectoryGrid:
         for begin, end in pairwise(starts.tolist()):
             zeros = order[begin:end]
             closed = bool(len(zeros) > 2 and self.links[zeros[0], 1] >= 0)
+            if closed:
+                zeros = np.append(zeros, zeros[0])
             found.append(RoughBranch(self, zeros, self.macroscopic[zeros], closed))
         return tuple(sorted(found, key=len, reverse=True))
 
