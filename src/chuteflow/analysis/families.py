@@ -170,7 +170,7 @@ class Family:
             except SolveError:
                 pieces.append([other])
         ends = [LOST] * (2 * len(pieces))
-        if len(pieces) == 1 and found[0] is found[-1]:
+        if len(found) > 1 and len(pieces) == 1 and found[0] is found[-1]:
             ends = [CLOSED, CLOSED]
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
