@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from chuteflow.analysis.existence import imbalance
-from chuteflow.analysis.families import TracedFamily, search, traced_families
+from chuteflow.analysis.families import TracedFamily, doubt, search, searched, trace_all
 from chuteflow.analysis.paths import Chord, Point, find_zero
 from chuteflow.analysis.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
-from chuteflow.analysis.results import Branch, Curve, Searched, SpecialPoint
+from chuteflow.analysis.results import Branch, Curve, SpecialPoint
 from chuteflow.analysis.rough_turns import dips
 from chuteflow.checks import whole
 from chuteflow.steady.chute import Chute
@@ -65,7 +65,8 @@ def curve(
     tolerance = checked_tolerance(tolerance)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
-    found = traced_families(problem, within, tolerance)
+    found, lost = trace_all(problem, within, tolerance)
+    grid = search(problem, within)
     longest = max((float(family.arclength[-1]) for family in found), default=1.0)
     branches = [
         _branch(chute, family, _samples(family, points, float(family.arclength[-1]) / longest), tolerance)
@@ -75,9 +76,10 @@ def curve(
     return Curve(
         chute=chute,
         branches=tuple(branches),
-        searched=Searched((within.coldest, within.hottest), min(within.deepest, search(problem, within).deepest)),
+        searched=searched(within, grid),
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
+        incomplete=doubt(grid, within, lost, "a family"),
     )
 
 

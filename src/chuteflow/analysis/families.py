@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 
 from chuteflow.analysis.paths import Chord, Point, Turn, find_value, point_at, refined, turns
 from chuteflow.analysis.ranges import CLOSED, Range
+from chuteflow.analysis.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
-#: So many rough flows further out are tried where a first or last one leads nowhere.
-_OUTWARD = 16
+#: Where a first or last rough flow leads nowhere, those so many places further are tried.
+_OTHERS = (0, 1, 2, 4, 8, 16)
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
@@ -39,12 +41,14 @@ NEAR, _PER_SPACING = 0.005, 0.15
 #: least the second; and there by more than so many times of what the rough flow was wrong by.
 _STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
 #: Where the flows among rough ones are not found, they are looked for between rough ones so much further away.
-_FURTHER = (0.1, 0.5, np.inf)
+_FURTHER = 0.1
 #: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
 #: where it changes by more than the second along the branch, per length.
 _NEARLY, _FIXES = 0.01, 1e-3
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
 _AT_EDGE = 1e-6
+#: An undecided cell may hide a flow with a value that is as near to its own, in the logarithm.
+_HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
 #: Why a branch ends where it is lost.
@@ -142,12 +146,12 @@ class Family:
                 raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
             return found
 
-        last_place = len(self.macroscopic) - 1
-        inward = range(begin + 1, end)
-        begin, first = outermost([*range(begin, max(begin - _OUTWARD, -1), -1), *(inward if begin == 0 else ())])
-        end, last = outermost(
-            [*range(end, min(end + _OUTWARD, last_place + 1)), *(inward[::-1] if end == last_place else ())]
-        )
+        # Outwards, and from an end of the branch inwards.
+        whole, middle = len(self.macroscopic) - 1, (begin + end) // 2
+        sign = -1 if begin > 0 else 1
+        begin, first = outermost([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle])
+        sign = 1 if end < whole else -1
+        end, last = outermost([i for k in _OTHERS if middle < (i := end + sign * k) <= whole])
         inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
@@ -162,7 +166,7 @@ class Family:
         if self.rough.closed and len(inside) == len(self.macroscopic) and found:
             while len(found) > 1 and _is_behind(found[0], found[-1]):
                 found.pop()
-            found.append(found[0])
+            found = [*found, found[0]] if len(found) > 2 else []
         pieces: list[list[Point]] = [found[:1]]
         for one, other in pairwise(found):
             try:
@@ -183,13 +187,16 @@ class Family:
     def _spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
         length = self.arclength
+        least, most = _TOO_NEAR, _SPACING
+        if self.rough.closed:
+            least, most = min(least, length[-1] / 16.0), min(most, length[-1] / 8.0)
         kept, ahead = [begin], self._direction(begin)
         for i in range(begin + 1, end):
             step = length[i] - length[kept[-1]]
-            if step < _TOO_NEAR:
+            if step < least:
                 continue
             here = self._direction(i)
-            if here is not None and (step > _SPACING or ahead is None or float(here @ ahead) < _TURNED):
+            if here is not None and (step > most or ahead is None or float(here @ ahead) < _TURNED):
                 kept.append(i)
                 ahead = here
         return [*kept, end] if end > begin else kept
@@ -204,6 +211,33 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
 def search(model: Model, within: Range) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
     return carry_down(model, within.coldest, within.hottest, within.deepest)
+
+
+def searched(within: Range, grid: TrajectoryGrid) -> Searched:
+    """The range searched, and the cells that the search looked at."""
+    cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
+    return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
+
+
+def doubt(
+    grid: TrajectoryGrid, within: Range, lost: list[Array], what: str, which: int = 0, value: float | None = None
+) -> str | None:
+    """What the search leaves open in the range, in words: flows seen and not solved, with the rough quantities
+    ``lost``, depths not reached, cells that may hide flows, where a value is given only those near it."""
+    if lost:
+        many = f"{len(lost)} {'families' if what == 'a family' else 'flows'} were" if len(lost) > 1 else f"{what} was"
+        return f"{many} seen and not solved, near {_place(lost[0])}"
+    if grid.deepest < within.deepest * (1.0 - 1e-9):
+        return f"beyond a hold-up of {grid.deepest:.4g} there are too many flows to search"
+    hidden = [m for m in grid.hidden if within.contains(m) and np.isfinite(m).all()]
+    if value is not None:
+        hidden = [m for m in hidden if abs(m[which] - np.log(value)) < _HIDDEN]
+    return f"the search does not tell flows apart near {_place(hidden[0])}" if hidden else None
+
+
+def _place(macroscopic: Array) -> str:
+    mass, temperature = np.exp(macroscopic[LOG_M:])
+    return f"M = {mass:.4g} and T_surface = {temperature:.4g}"
 
 
 def crossings(
@@ -296,13 +330,13 @@ def _solve_among(
     """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
     pieces. None where they are not found."""
     length = family.arclength
-    for further in _FURTHER:
+    for _ in range(2):
         try:
             points = family.points(begin, end, which, target, tolerance)
             return _on_path(points, which, target, tolerance)
         except SolveError:
-            begin = max(int(np.searchsorted(length, length[begin] - further)) - 1, 0)
-            end = min(int(np.searchsorted(length, length[end] + further)), len(length) - 1)
+            begin = max(int(np.searchsorted(length, length[begin] - _FURTHER)) - 1, 0)
+            end = min(int(np.searchsorted(length, length[end] + _FURTHER)), len(length) - 1)
     return None
 
 
@@ -393,4 +427,17 @@ class TracedFamily:
 
 def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
     """Every branch of flows in the range, solved from end to end."""
-    return [piece for family in families(model, within) for piece in family.traced(tolerance)]
+    return trace_all(model, within, tolerance)[0]
+
+
+def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
+    """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
+    found: list[TracedFamily] = []
+    lost: list[Array] = []
+    for family in families(model, within):
+        pieces = family.traced(tolerance)
+        found += pieces
+        inside = [m for m in family.macroscopic if within.contains(m)]
+        if len(inside) > 1 and not pieces:
+            lost.append(inside[len(inside) // 2])
+    return found, lost

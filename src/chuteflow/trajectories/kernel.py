@@ -305,8 +305,8 @@ def carry(
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
     where it was inserted, the first position of each row (R + 1,), zeros of B: left or upper position, right or lower
-    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), positions of edges that were not
-    resolved (U,), and how the curve ended.
+    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), the first states of the cells that
+    could not be decided (U,), how many cells were looked at, and how the curve ended.
     """
     n = len(log_t)
     states = np.empty((64 * n + 1024, 5))
@@ -314,8 +314,8 @@ def carry(
     first = np.zeros(len(overburden) + 1, np.int64)
     zeros = np.empty((256, 3))
     links = np.full((256, 2), -1, np.int64)
-    unresolved = np.empty(64, np.int64)
-    n_zeros = n_unresolved = total = 0
+    undecided = np.empty(64, np.int64)
+    n_zeros = n_undecided = total = cells = 0
     status = DONE
 
     # The curve: n positions in use of these.
@@ -364,7 +364,7 @@ def carry(
                     if not math.isfinite(rows[j, S_G]):
                         rows[j, S_G] = 1e300
                     frozen[j] = True
-        # Where to insert.
+        # Where to insert; a cell is undecided where that is not enough.
         for j in range(n):
             region[j] = COLD if frozen[j] else region_of(bounds, p, rows[j, S_L], rows[j, S_Y])
             residual[j] = rows[j, S_Y] - look_up(values, rows[j, S_L], BASE)
@@ -375,10 +375,19 @@ def carry(
             wanted[j] = 0
             if j + 1 == n or not open_[j] or (region[j] != FREE and region[j] == region[j + 1]):
                 continue
+            cells += 1
+            limited = False
             if length[j] > delta:
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-            elif length[j] > finest and not in_series[j] and _hides_zeros(values, rows, residual, j, n, open_, length):
-                wanted[j] = 1
+                limited = length[j] > 2.0 * delta * (wanted[j] + 1)
+            elif not in_series[j]:
+                doubtful = _hides_zeros(values, rows, residual, j, n, open_, length)
+                wanted[j] = 1 if doubtful and length[j] > finest else 0
+                limited = doubtful and length[j] <= finest
+            if limited:
+                undecided = _grown(undecided, n_undecided + 1)
+                undecided[n_undecided] = j + extra + total
+                n_undecided += 1
             extra += wanted[j]
         if total + n + extra > most:
             status = FULL
@@ -457,10 +466,6 @@ def carry(
                 zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
                 edge[j] = n_zeros
                 n_zeros += 1
-                if _distance(rows, j, per_flux) > 2.0 * delta:
-                    unresolved = _grown(unresolved, n_unresolved + 1)
-                    unresolved[n_unresolved] = total + j
-                    n_unresolved += 1
         # Zeros along trajectories since the row before, and lines through the cells between the rows.
         if row > 0:
             for j in range(n):
@@ -528,7 +533,8 @@ def carry(
         first,
         zeros[:n_zeros],
         links[:n_zeros],
-        unresolved[:n_unresolved],
+        undecided[:n_undecided],
+        cells,
         status,
     )
 
