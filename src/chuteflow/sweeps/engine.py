@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.analysis.enumeration import flows as search
+from chuteflow.branches.enumeration import flows as search
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import SURFACES, Chute

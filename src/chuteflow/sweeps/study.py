@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.branches.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
 from chuteflow.checks import shown
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import SURFACES
