@@ -13,7 +13,8 @@ import pytest
 from chuteflow import Chute, curve, flows
 from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.branches.ranges import Range
+from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import model
 

@@ -9,8 +9,9 @@ import pytest
 from chuteflow import Chute, curve, flows
 from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import Chord, turns
-from chuteflow.branches.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.branches.rough_turns import dips, may_turn
+from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
 from chuteflow.steady.model import model
 

@@ -16,15 +16,15 @@ from chuteflow.bifurcations.points import BoundaryPoint
 from chuteflow.bifurcations.system import Sweep
 from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
 from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import Searched
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control
+from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.model import PARAMETERS
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 from chuteflow.threads import on_one_thread

@@ -14,10 +14,11 @@ import numpy as np
 from chuteflow.branches.existence import imbalance
 from chuteflow.branches.families import TracedFamily, search, traced_families
 from chuteflow.branches.paths import Chord, Point, find_zero
-from chuteflow.branches.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import Branch, Curve, Searched, SpecialPoint
 from chuteflow.branches.rough_turns import dips
 from chuteflow.checks import whole
+from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of, rough_kinds

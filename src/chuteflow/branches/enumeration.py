@@ -13,11 +13,12 @@ import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
 from chuteflow.branches.families import Family, crossings, families, search
-from chuteflow.branches.ranges import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import FlowSet, Searched
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import flows_of

@@ -9,13 +9,9 @@ import numpy as np
 from chuteflow.checks import number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import DEEPEST, SHALLOWEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
 
-#: Range searched unless another is asked for.
-SURFACE_TEMPERATURE = (1e-3, 1e5)
-LARGEST_HOLDUP = 30.0
-#: What can be searched at all.
-WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
 #: Why a branch ends for good, in words.
 VANISHES, CLOSED = "its hold-up vanishes", "the branch closes on itself"
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.

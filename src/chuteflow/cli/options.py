@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,19 +24,8 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 #: Endings of the files that --save and --plot write.
 SAVED, DRAWN = (".nc", ".csv", ".json"), (".png", ".pdf", ".svg")
 
-#: Options of the material parameters: their names in Chute and what is allowed.
-_MATERIAL = {
-    "e": ("restitution", "above 0 and at most 1, for example --e 0.8"),
-    "ew": ("wall_restitution", "from 0 to 1, for example --ew 0.8"),
-    "roughness": ("roughness", "from 1/2 to sqrt(3)/2, for example --roughness 0.6"),
-}
-#: Options of the condition, and the number of the registry that each gives.
-_CONDITIONS = {
-    "flux": ("Q", "mass_flux"),
-    "holdup": ("M", "mass_holdup"),
-    "centre_of_mass": ("h", "centre_of_mass"),
-    "temperature": ("T_surface", "surface_temperature"),
-}
+#: The conditions by their options.
+_CONDITIONS = {condition.option: condition for condition in CONDITIONS.values()}
 _SCALES = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
 
 
@@ -99,12 +89,32 @@ def _options(*decorators: Callable[[Command], Command]) -> Callable[[Command], C
     return add
 
 
+def _opening(text: str) -> str:
+    """``text`` as it begins a sentence."""
+    return text[:1].upper() + text[1:]
+
+
+def range_options(slope: str) -> Callable[[Command], Command]:
+    """Options of the parameters of a chute where some of them take a range; ``slope`` says which."""
+    return _options(
+        option("--slope", type=NumberOrInterval(), help=f"Slope tan(theta) of the chute; LO:HI {slope}."),
+        option("--angle", type=Number(), help="Inclination theta in degrees, instead of --slope."),
+        *(
+            option(f"--{key}", type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
+            for key, parameter in BY_KEY.items()
+            if key != "slope"
+        ),
+    )
+
+
 chute_options = _options(
     option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
     option("--angle", type=Number(), help="Inclination theta in degrees."),
-    option("--e", type=Number(), help="Restitution e of two grains, above 0 and at most 1."),
-    option("--ew", type=Number(), help="Restitution e_w of a grain and the base, from 0 to 1."),
-    option("--roughness", type=Number(), help="Roughness r of the base, from 1/2 to sqrt(3)/2."),
+    *(
+        option(f"--{key}", type=Number(), help=f"{_opening(parameter.description)}, {parameter.allowed}.")
+        for key, parameter in BY_KEY.items()
+        if key != "slope"
+    ),
     option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
     option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier."),
 )
@@ -118,9 +128,9 @@ search_range_options = _options(
     option(
         "--search-temperature",
         type=Interval(),
-        help="Surface temperatures searched; 0.001:100000 by default.",
+        help=f"Surface temperatures searched; {SURFACE_TEMPERATURE[0]:g}:{SURFACE_TEMPERATURE[1]:.0f} by default.",
     ),
-    option("--largest-holdup", type=Number(), help="Largest mass hold-up searched; 30 by default."),
+    option("--largest-holdup", type=Number(), help=f"Largest mass hold-up searched; {LARGEST_HOLDUP:g} by default."),
 )
 search_options = _options(
     option("--tolerance", type=Number(), help="Relative error allowed in Q, h and M; 1e-10 by default."),
@@ -148,13 +158,17 @@ def chute(given: Mapping[str, Any]) -> Chute:
 
     if given["slope"] is not None and given["angle"] is not None:
         raise InputError(f"--slope {given['slope']:g} and --angle {given['angle']:g}: give one of them, not both")
-    allowed = {f"--{name}": range_ for name, (_, range_) in _MATERIAL.items() if given[name] is None}
+    material = [parameter for parameter in BY_KEY.values() if parameter.name != "slope"]
+    missing = [
+        f"--{parameter.key} ({parameter.allowed}, for example --{parameter.key} {parameter.example})"
+        for parameter in material
+        if given[parameter.key] is None
+    ]
     if given["slope"] is None and given["angle"] is None:
-        allowed = {"--slope or --angle": "tan(theta) above 0, for example --slope 0.3, or degrees"} | allowed
-    if allowed:
-        what = "; ".join(f"{name} ({range_})" for name, range_ in allowed.items())
-        raise InputError(f"missing {what}")
-    others: dict[str, Any] = {name: given[option] for option, (name, _) in _MATERIAL.items()}
+        missing = ["--slope or --angle (tan(theta) above 0, for example --slope 0.3, or degrees)", *missing]
+    if missing:
+        raise InputError(f"missing {'; '.join(missing)}")
+    others: dict[str, Any] = {parameter.name: given[parameter.key] for parameter in material}
     others |= {name: given[name] for name in ("surface", "closure") if given[name] is not None}
     if given["angle"] is not None:
         return Chute.at_angle(given["angle"], **others)
@@ -194,8 +208,9 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
         raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
     from chuteflow.cli.units import read_amount
 
-    argument, quantity = _CONDITIONS[named[0]]
-    return {argument: read_amount(_written(named[0]), given[named[0]], quantity, scales, chute.slope)}
+    chosen = _CONDITIONS[named[0]]
+    amount = read_amount(_written(chosen.option), given[chosen.option], chosen.quantity, scales, chute.slope)
+    return {chosen.key: amount}
 
 
 def _written(name: str) -> str:

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from chuteflow.explorer.queries import CONTROLS, ColumnAsked
-from chuteflow.io.contract import PARAMETERS
 from chuteflow.maps.columns import Part, column
 from chuteflow.maps.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
+from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
 #: where every point has trajectories of its own, finer for what is known in closed form.
 _FIRST, _FIRST_HOT = 9, 33
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
-_OF_BASE = ("ew", "roughness")
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     x, y, place = asked.x, asked.y, asked.place
     plane = _plane(asked.chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
-    tolerance = _TOLERANCE[inner in _OF_BASE]
+    tolerance = _TOLERANCE[BY_KEY[inner].of_base]
     found = column(place, partial(summary, plane), [*_evenly(_FIRST), *_beside(plane, asked, tolerance)], tolerance)
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
@@ -67,7 +66,7 @@ def _beside(plane: Plane, asked: ColumnAsked, tolerance: float) -> list[float]:
 
 @lru_cache(maxsize=8)
 def _plane(chute: Chute, x: str, y: str) -> Plane:
-    across, up = (Axis(PARAMETERS[name], CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
+    across, up = (Axis(BY_KEY[name].name, CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
     return Plane(across, up, chute, ())
 
 

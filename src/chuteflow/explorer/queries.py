@@ -9,9 +9,9 @@ from typing import Any
 from chuteflow.checks import number_in
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
+from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.quantities import Scales
-from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.laws import LAWS
 
 Query = Mapping[str, str]
@@ -39,7 +39,12 @@ CONTROLS = {
     "e": Control("Restitution", "e", 0.5, 1.0, False, "Share of speed that two grains keep as they collide; 1 is all."),
     "ew": Control("Base restitution", "e_w", 0.0, 1.0, False, "Share of speed that a grain keeps as it hits the base."),
     "roughness": Control(
-        "Roughness", "r", *ROUGHNESS_RANGE, False, "How deep a grain sinks between those glued to the base."
+        "Roughness",
+        "r",
+        BY_KEY["roughness"].low,
+        BY_KEY["roughness"].high,
+        False,
+        "How deep a grain sinks between those glued to the base.",
     ),
     "Q": Control(
         "Mass flux", "Q", *FLUX_RANGE, True, "Mass that passes per unit width and time, here in ρd√(gd cos θ)."
@@ -166,7 +171,7 @@ def map_column(query: Query) -> ColumnAsked:
     Raises:
         InputError: for parameters that are missing, unknown, the same or out of range.
     """
-    axes = [name for name in CONTROLS if name in PARAMETERS]
+    axes = list(BY_KEY)
     given = [query.get(which, "") for which in ("x", "y")]
     for which, name in zip("xy", given, strict=True):
         if name not in axes:

@@ -13,19 +13,13 @@ from typing import Any, NoReturn
 from chuteflow.branches.counting import Count, flux_counts
 from chuteflow.branches.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY, NAMES
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
-PARAMETERS = {
-    "slope": "slope",
-    "e": "restitution",
-    "ew": "wall_restitution",
-    "roughness": "roughness",
-    "surface": "surface",
-    "closure": "closure",
-}
+PARAMETERS = {key: parameter.name for key, parameter in BY_KEY.items()} | {name: name for name in NAMES}
 #: The same the other way round.
 SHORT = {long: short for short, long in PARAMETERS.items()}
 

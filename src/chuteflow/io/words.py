@@ -10,6 +10,7 @@ from chuteflow.branches.counting import Count, flux_counts
 from chuteflow.branches.results import Curve, Searched
 from chuteflow.io.contract import factor
 from chuteflow.io.tables import number
+from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
@@ -58,11 +59,9 @@ def kinds(flow: Flow) -> str:
 
 def chute(chute: Chute) -> str:
     """All parameters of ``chute``."""
-    return (
-        f"chute: tan(theta) = {chute.slope:g} ({chute.angle:.4g} degrees), e = {chute.restitution:g}, "
-        f"e_w = {chute.wall_restitution:g}, r = {chute.roughness:g}, {_SURFACES[chute.surface]}, "
-        f"closure {chute.closure}"
-    )
+    slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
+    numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
+    return f"chute: {numbers}, {_SURFACES[chute.surface]}, closure {chute.closure}"
 
 
 def scales(scales: Scales) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.branches.ranges import LARGEST_HOLDUP, SURFACE_TEMPERATURE, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import Searched
 from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
@@ -25,6 +25,7 @@ from chuteflow.maps.columns import Classify, Column, between, column, shares_for
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
 from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
 from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
+from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chuteflow.branches.ranges import LARGEST_HOLDUP, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.maps.trajectories import Trajectories, integrate
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import LARGEST_HOLDUP
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import CONDUCTION, LOSS, WORK, Model, model
 

@@ -17,15 +17,12 @@ from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.maps.fan import Base, Fan, fan
 from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
+from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
-from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 from chuteflow.theory.laws import law
 
-#: The four parameters, as :class:`chuteflow.Chute` calls them; the last two are those of the base.
-PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
-_OF_BASE = PARAMETERS[2:]
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
 #: for. All but the first two are 1 where there are such flows, else 0.
 CODES = ("most", "families", *INTERIORS, *DENSITIES)
@@ -61,10 +58,7 @@ class Axis:
             raise InputError(f"unknown parameter {self.name!r}: choose one of {', '.join(PARAMETERS)}")
         for end in ("low", "high"):
             object.__setattr__(self, end, number(self.name, getattr(self, end)))
-        if self.name == "roughness":
-            # sqrt(3)/2 typed with a few digits rounds up.
-            top = ROUGHNESS_RANGE[1]
-            object.__setattr__(self, "high", top if top < self.high <= top + 5e-5 else self.high)
+        object.__setattr__(self, "high", PARAMETERS[self.name].rounded(self.high))
         if not self.low < self.high:
             raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
 
@@ -88,7 +82,7 @@ class Plane:
     y: Axis
     chute: Chute
     temperatures: tuple[float, ...]
-    within: Range = field(default_factory=lambda: Range.checked((1e-3, 1e5), 30.0))
+    within: Range = field(default_factory=lambda: Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
 
     def __post_init__(self) -> None:
         if self.x.name == self.y.name:
@@ -105,7 +99,7 @@ class Plane:
     @property
     def transposed(self) -> bool:
         """Whether the inner axis is ``x``: the first that is of the base, else ``y``."""
-        return self.y.name not in _OF_BASE and self.x.name in _OF_BASE
+        return PARAMETERS[self.x.name].of_base and not PARAMETERS[self.y.name].of_base
 
     @property
     def outer(self) -> Axis:
@@ -169,7 +163,7 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
 
 def _neutral(plane: Plane) -> dict[str, Any]:
     """Fixed values of those parameters that one fan serves all values of."""
-    return {axis.name: axis.low for axis in (plane.x, plane.y) if axis.name in _OF_BASE}
+    return {axis.name: axis.low for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
 
 
 @lru_cache(maxsize=4)
@@ -178,7 +172,7 @@ def _fan(plane: Plane, chute: Chute, registered: Law) -> Fan:
     del registered  # known here to tell what is remembered of one law from that of another
     served = [chute]
     for axis in (plane.x, plane.y):
-        if axis.name in _OF_BASE:
+        if PARAMETERS[axis.name].of_base:
             shares = np.linspace(0.0, 1.0, _BETWEEN)
             served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
     return fan(chute, [Base.of(base) for base in served], plane.within, np.array(plane.temperatures), _PER_DECADE)

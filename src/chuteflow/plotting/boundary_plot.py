@@ -15,8 +15,9 @@ from chuteflow.bifurcations.tracing import TURNS
 from chuteflow.branches.results import KINDS
 from chuteflow.io.contract import PLACE
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
-from chuteflow.plotting.plots import PARAMETERS
+from chuteflow.plotting.plots import parameters
 from chuteflow.steady.quantities import NUMBERS
 
 if TYPE_CHECKING:
@@ -57,9 +58,9 @@ def plot_boundaries(found: BoundarySet, quantity: str = "mass_flux") -> Figure:
     for edge in edges:
         ax.plot(edge.parameter, getattr(edge, quantity), zorder=1, **_LIMIT.line(0.9))
     ax.set(xlim=box[0], ylim=box[1])
-    name, symbol = PARAMETERS[found.second]
-    style.name_axes(ax, f"{name}, ${symbol}$", style.label(quantity))
-    style.caption(figure, f"{KINDS[found.kind]}\n{_others(found)}")
+    second = PARAMETERS[found.second]
+    style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity))
+    style.caption(figure, f"{KINDS[found.kind]}\n{parameters(found.chute, found.second)}")
     key = list(_key(found, edges, quantity))
     beside = all(len(entry.get_label()) < _LONG for entry in key)
     style.legend(figure, handles=key, loc="outside lower center", ncols=2 if beside else 1)
@@ -135,17 +136,6 @@ def _name_sides(ax: Axes, boundary: Boundary, quantity: str) -> None:
             va="center",
             fontstyle="italic",
         )
-
-
-def _others(found: BoundarySet) -> str:
-    """The other parameters, in words and symbols."""
-    said = [
-        rf"${symbol} = {getattr(found.chute, name):.4g}$"
-        for name, (_, symbol) in PARAMETERS.items()
-        if name != found.second
-    ]
-    surface = {"free": "free surface", "interface": "interface"}[found.chute.surface]
-    return ", ".join([*said, surface, f"closure {found.chute.closure}"])
 
 
 def _marker(kind: str, colour: str) -> dict[str, Any]:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.maps import Boundary, Domain
+from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
-from chuteflow.plotting.plots import PARAMETERS
+from chuteflow.plotting.plots import parameters
 from chuteflow.steady.quantities import NUMBERS
 
 if TYPE_CHECKING:
@@ -77,21 +78,14 @@ def plot_domain(found: Domain) -> Figure:
 
 
 def _axis_label(parameter: str) -> str:
-    words, symbol = PARAMETERS[parameter]
-    return f"{words}, ${symbol}$"
+    return f"{PARAMETERS[parameter].noun}, ${PARAMETERS[parameter].latex}$"
 
 
 def _others(found: Domain) -> str:
     plane = found.plane
-    said = [
-        rf"${symbol} = {getattr(plane.chute, name):.4g}$"
-        for name, (_, symbol) in PARAMETERS.items()
-        if name not in (plane.x.name, plane.y.name)
-    ]
-    surface = {"free": "free surface", "interface": "interface"}[plane.chute.surface]
     low, high = found.searched.surface_temperature
     searched = rf"${_TEMPERATURE}$ from {low:g} to {high:g}, $M$ to {found.searched.largest_holdup:g}"
-    return f"{', '.join([*said, surface])}, closure {plane.chute.closure}; {searched}"
+    return f"{parameters(plane.chute, plane.x.name, plane.y.name)}; {searched}"
 
 
 def _number_panel(ax: Axes, found: Domain) -> None:

@@ -16,6 +16,7 @@ from chuteflow.io import words
 from chuteflow.io.contract import PLACE, factor
 from chuteflow.io.tables import number
 from chuteflow.io.writing import require_writable, write_whole
+from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
@@ -27,13 +28,6 @@ if TYPE_CHECKING:
 
 #: Endings that figures are written with.
 SUFFIXES = (".png", ".pdf", ".svg")
-#: Words and symbols of the parameters of a chute.
-PARAMETERS = {
-    "slope": ("slope", r"\tan\theta"),
-    "restitution": ("restitution", "e"),
-    "wall_restitution": ("wall restitution", "e_w"),
-    "roughness": ("roughness", "r"),
-}
 _FIELDS = ("volume_fraction", "granular_temperature", "velocity")
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"), ("mass_holdup", "centre_of_mass"))
 _POINTS = 401
@@ -130,13 +124,15 @@ def _none(chute: Chute, reason: str | None) -> Figure:
     return figure
 
 
-def parameters(chute: Chute) -> str:
-    """All parameters of ``chute``, for a caption."""
+def parameters(chute: Chute, *left_out: str) -> str:
+    """The parameters of ``chute`` for a caption, but for those ``left_out``, which stand on the axes."""
+    numbers = [
+        f"${parameter.latex} = {getattr(chute, name):.5g}$"
+        for name, parameter in PARAMETERS.items()
+        if name not in left_out
+    ]
     surface = {"free": "free surface", "interface": "interface"}[chute.surface]
-    return (
-        rf"$\tan\theta = {chute.slope:g}$, $e = {chute.restitution:g}$, $e_w = {chute.wall_restitution:g}$, "
-        rf"$r = {chute.roughness:.4g}$, {surface}, closure {chute.closure}"
-    )
+    return ", ".join([*numbers, surface, f"closure {chute.closure}"])
 
 
 def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:

@@ -11,15 +11,16 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
+from chuteflow.steady.quantities import NUMBERS, PLACE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.bifurcations.boundary import Boundary, BoundarySet
 
-#: Second parameters, as options and in Chute, and the numbers that can stand on the vertical axis.
-_SECOND = {"slope": "slope", "e": "restitution", "ew": "wall_restitution", "roughness": "roughness"}
-_UPRIGHT = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}
+#: The numbers that can stand on the vertical axis, by their symbols.
+_UPRIGHT = {NUMBERS[name].symbol: name for name in PLACE}
 _EPILOG = (
     "Example: chuteflow boundary --of fold-Q --in slope,Q --slope 0.2:0.45 --e 0.8 --ew 0.8 --roughness 0.6"
     " --plot folds.png"
@@ -34,9 +35,9 @@ class Plane(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
         """Both names."""
         names = [name.strip() for name in str(value).split(",")]
-        if len(names) != 2 or names[0] not in _SECOND or names[1] not in _UPRIGHT:
+        if len(names) != 2 or names[0] not in BY_KEY or names[1] not in _UPRIGHT:
             self.fail(
-                f"{value!r}: write one of {', '.join(_SECOND)}, a comma and one of {', '.join(_UPRIGHT)}, "
+                f"{value!r}: write one of {', '.join(BY_KEY)}, a comma and one of {', '.join(_UPRIGHT)}, "
                 "for example slope,Q",
                 param,
                 ctx,
@@ -51,13 +52,7 @@ class Plane(click.ParamType):
     help="What to follow: fold-Q (the default), fold-M, fold-T, density-inversion or interior-change.",
 )
 @options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
-@options.option(
-    "--slope", type=options.NumberOrInterval(), help="Slope tan(theta); LO:HI where it is the second parameter."
-)
-@options.option("--angle", type=options.Number(), help="Inclination theta in degrees, instead of --slope.")
-@options.option("--e", type=options.NumberOrInterval(), help="Restitution e of two grains; or LO:HI.")
-@options.option("--ew", type=options.NumberOrInterval(), help="Restitution e_w of a grain and the base; or LO:HI.")
-@options.option("--roughness", type=options.NumberOrInterval(), help="Roughness r of the base; or LO:HI.")
+@options.range_options("where it is the second parameter")
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
 @options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
@@ -72,7 +67,7 @@ def command(**given: Any) -> None:
 
     chosen = {name: given[option] for name, option in (("of", "of"), ("samples", "samples")) if given[option]}
     found = boundary(
-        chute, second=_SECOND[second], bounds=bounds, progress=_progress, **chosen, **options.search(given)
+        chute, second=BY_KEY[second].name, bounds=bounds, progress=_progress, **chosen, **options.search(given)
     )
     _clear()
     if given["as_json"]:
@@ -102,7 +97,7 @@ def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], 
     Raises:
         InputError: for a range that is missing, or given for another parameter.
     """
-    for name in _SECOND:
+    for name in BY_KEY:
         if name != second and isinstance(given[name], tuple):
             low, high = given[name]
             raise InputError(
@@ -129,7 +124,7 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
     from chuteflow.io import words
 
     yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
-    others = {short: getattr(found.chute, name) for short, name in _SECOND.items() if short != second}
+    others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
     said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
     yield f"chute: {said}, surface {found.chute.surface}, closure {found.chute.closure}"
     for i, boundary in enumerate(found, 1):

@@ -11,6 +11,7 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
 from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from chuteflow.maps import Domain
     from chuteflow.steady.chute import Chute
 
-#: The parameters, as options and in Chute.
-_AXES = {"slope": "slope", "e": "restitution", "ew": "wall_restitution", "roughness": "roughness"}
 #: Processes at most, unless another number is asked for.
 _MOST_PROCESSES = 8
 _EPILOG = (
@@ -54,11 +53,7 @@ class Numbers(click.ParamType):
 
 
 @click.command("domain", help=COMMANDS["domain"], epilog=_EPILOG)
-@options.option("--slope", type=options.NumberOrInterval(), help="Slope tan(theta); LO:HI puts it on an axis.")
-@options.option("--angle", type=options.Number(), help="Inclination theta in degrees, instead of --slope.")
-@options.option("--e", type=options.NumberOrInterval(), help="Restitution e of two grains; or LO:HI.")
-@options.option("--ew", type=options.NumberOrInterval(), help="Restitution e_w of a grain and the base; or LO:HI.")
-@options.option("--roughness", type=options.NumberOrInterval(), help="Roughness r of the base; or LO:HI.")
+@options.range_options("puts it on an axis")
 @options.option("--size", type=Size(), help="Cells along x and y; 400x400 by default.")
 @options.option("--temperature", type=Numbers(), help="Surface temperatures at which to look for flows, as 1,10,100.")
 @options.option(
@@ -115,14 +110,14 @@ def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:
         InputError: for more or fewer than two ranges.
     """
     # Options come in the order in which they are written.
-    ranges = {name: value for name, value in given.items() if name in _AXES and isinstance(value, tuple)}
+    ranges = {name: value for name, value in given.items() if name in BY_KEY and isinstance(value, tuple)}
     if len(ranges) != 2:
         got = ", ".join(f"--{name} {low:g}:{high:g}" for name, (low, high) in ranges.items()) or "none"
         raise InputError(
             f"{len(ranges)} ranges ({got}): give two of --slope, --e, --ew and --roughness as LO:HI, "
             "for example --slope 0.1:0.5 --roughness 0.5:0.866"
         )
-    axes = [(_AXES[name], *bounds) for name, bounds in ranges.items()]
+    axes = [(BY_KEY[name].name, *bounds) for name, bounds in ranges.items()]
     return axes[0], axes[1], options.chute({**given, **{name: low for name, (low, _) in ranges.items()}})
 
 
@@ -148,7 +143,9 @@ def _report(found: Domain) -> Iterator[str]:
         f"{len(found.x)} x {len(found.y)} cells"
     )
     others = [
-        f"{short} = {getattr(plane.chute, name):g}" for short, name in _AXES.items() if name not in (x.name, y.name)
+        f"{key} = {getattr(plane.chute, parameter.name):g}"
+        for key, parameter in BY_KEY.items()
+        if parameter.name not in (x.name, y.name)
     ]
     yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, closure {plane.chute.closure}"
     yield ""
