@@ -580,3 +580,44 @@ def trace_back(states: Any, came_from: Any, place: float, row: int) -> Any:
             out[r, q] = (1.0 - t) * states[one, q] + t * states[other, q]
         place = (1.0 - t) * came_from[one] + t * came_from[other]
     return out
+
+
+@compiled
+def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
+    """Bounds of the least and the largest net loss, and of the largest p y/a, of each trajectory down to each state:
+    lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a trajectory
+    lies between its neighbours, and its extrema between theirs."""
+    out = np.empty((len(states), 6))
+    for row in range(len(overburden)):
+        p = overburden[row] + p_s
+        for i in range(first[row], first[row + 1]):
+            net = look_up(values, states[i, S_L], NET)
+            turn = p * states[i, S_Y] * look_up(values, states[i, S_L], INVERSE)
+            out[i, 0] = out[i, 1] = out[i, 3] = out[i, 4] = net
+            out[i, 2] = out[i, 5] = turn
+            if row > 0:
+                one = int(came_from[i])
+                other = one + 1 if came_from[i] > one else one
+                for low in (0, 3):
+                    for q in range(low, low + 3):
+                        bound = min(out[one, q], out[other, q]) if low == 0 else max(out[one, q], out[other, q])
+                        out[i, q] = min(out[i, q], bound) if q == low else max(out[i, q], bound)
+    return out
+
+
+@compiled
+def extremes_back(
+    values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, rows: Any
+) -> Any:
+    """The least and the largest net loss, and the largest p y/a, down to ``places`` (k,) in ``rows``, (k, 3)."""
+    out = np.empty((len(places), 3))
+    for k in range(len(places)):
+        back = trace_back(states, came_from, places[k], rows[k])
+        out[k, 0], out[k, 1], out[k, 2] = np.inf, -np.inf, -np.inf
+        for row in range(rows[k] + 1):
+            net = look_up(values, back[row, 0], NET)
+            turn = (overburden[row] + p_s) * back[row, 1] * look_up(values, back[row, 0], INVERSE)
+            out[k, 0] = min(out[k, 0], net)
+            out[k, 1] = max(out[k, 1], net)
+            out[k, 2] = max(out[k, 2], turn)
+    return out

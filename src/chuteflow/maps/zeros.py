@@ -1,0 +1,269 @@
+"""The flows that a grid of trajectories shows, as accurately as the grid allows without solving any.
+
+# notation: P overburden, p normal stress, L, y, k, a, net as in chuteflow.trajectories.tables; B = y - b(L) the residual of the
+# base condition; ln Q = ln(S + G), S = F1 sqrt(T) P the flux at the slip velocity, G that by shear.
+
+Along a trajectory all derivatives are known; across, they are taken through the neighbours at the same depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.tabulate import Array as Closures
+from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, LOSS, WORK
+from chuteflow.trajectories import kernel
+from chuteflow.trajectories.kernel import S_G, S_L, S_T, S_Y
+from chuteflow.trajectories.refining import TrajectoryGrid
+from chuteflow.trajectories.tables import tables
+
+Index = NDArray[np.int64]
+
+#: Neighbours are in one piece of the curve where they are nearer, in distances that are refined.
+_APART = 2.5
+#: Polynomials go through neighbours whose gaps differ by less than this factor.
+_EVEN = 12.0
+#: Weights of a cubic whose sizes sum to more extrapolate.
+_SOUND = 3.0
+#: Surface temperatures of neighbours tell them apart if their logarithms differ by more.
+_TOLD = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Zeros:
+    """The zeros of B on a grid, (Z,) each: ln Q, ln M, ln T_surface; ``rise``, the derivative of ln Q along the zeros
+    to a factor of one sign on each branch; ``extremes`` (Z, 6) lower and upper bounds of the least and the largest net
+    loss and the largest p dtheta/dp, and how far these are in ``doubt`` (Z, 3) for their place between states."""
+
+    grid: TrajectoryGrid
+    log_q: Array
+    log_m: Array
+    log_t: Array
+    rise: Array
+    extremes: Array
+    doubt: Array
+
+    def traced(self, which: Index) -> Array:
+        """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
+        grid = self.grid
+        zeros = grid.zeros[which]
+        rows = grid._rows(zeros[:, :2].astype(np.int64))
+        places = np.where(rows[:, 0] == rows[:, 1], zeros[:, 0] + zeros[:, 2], zeros[:, 1])
+        values = tables(grid.model).values
+        return kernel.extremes_back(
+            values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
+        )
+
+
+def zeros_on(grid: TrajectoryGrid) -> Zeros:
+    """The zeros of B on ``grid``."""
+    ends = grid.zeros[:, :2].astype(np.int64)
+    share = grid.zeros[:, 2]
+    rows = grid._rows(ends)
+    across = rows[:, 0] == rows[:, 1]
+    used, back = np.unique(ends, return_inverse=True)
+    known = _Known.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
+    one, two = back.reshape(ends.shape).T
+
+    # Along a trajectory: Hermite's cubic in ln P.
+    step = known.log_m[two] - known.log_m[one]
+    place = share.copy()
+    down = ~across
+    place[down] = _hermite_zero(
+        *(v[down] for v in (known.excess[one], known.excess[two], known.excess_down[one] * step, known.excess_down[two] * step)),
+        share[down],
+    )
+    log_q = _hermite(
+        known.log_q[one], known.log_q[two], known.flux_down[one] * step, known.flux_down[two] * step, place
+    )
+    log_m = known.log_m[one] + place * step
+    log_t = grid.states[ends[:, 0], S_T].copy()
+    # Through four neighbours at one depth.
+    log_q[across], log_t[across], place[across] = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
+
+    mixed = lambda of: of[one] + share * (of[two] - of[one])  # noqa: E731
+    excess_down, excess_across = mixed(known.excess_down), mixed(known.excess_across)
+    flux_down, flux_across = mixed(known.flux_down), mixed(known.flux_across)
+    size = np.abs(excess_down) + np.abs(excess_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
+    rise = (flux_across * excess_down - flux_down * excess_across) / size
+    every = kernel.extremes(
+        tables(grid.model).values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
+    )
+    low, high = every[ends[:, 0]], every[ends[:, 1]]
+    extremes = low + place[:, None] * (high - low)
+    return Zeros(grid, log_q, log_m, log_t, rise, extremes, 0.5 * np.abs(high - low)[:, :3])
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What is known at states (k,): ln M, B, ln Q, and their derivatives to ln P and from neighbour to neighbour."""
+
+    log_m: Array
+    excess: Array
+    log_q: Array
+    excess_down: Array
+    flux_down: Array
+    excess_across: Array
+    flux_across: Array
+
+    @classmethod
+    def at(cls, grid: TrajectoryGrid, places: Index, rows: Index) -> _Known:
+        model = grid.model
+        over = grid.overburden[rows]
+        p = over + model.surface_stress
+        big_l, y, _t, _h, glide = grid.states[places].T
+        f, df = model.closures(np.exp(big_l))
+        base, base_slope = model.base_flux(f), model.slope * model.slip_slope(df)
+        slip = model.slip(f)
+        root_t = np.exp(0.5 * (np.log(p) + f[GAMMA] - big_l))
+        sliding = slip * root_t * over
+        flux = sliding + glide
+        turn = p * y / f[CONDUCTION]
+        still = 1.0 - turn
+        warming = turn + f[COUPLING] * still
+        dilation, share = over / p, sliding / flux
+        l_down = dilation * still
+        y_down = over * (f[LOSS] - model.slope**2 * f[WORK]) - dilation * y * (1.0 + 0.5 * warming)
+        by_l = model.slip_slope(df) / slip + 0.5 * (df[GAMMA] - 1.0)
+        glide_down = model.slope * over**2 * f[WORK] * root_t
+        l_across, y_across, glide_across = _across(grid, places, rows)
+        return cls(
+            np.log(over),
+            y - base,
+            np.log(flux),
+            y_down - base_slope * l_down,
+            share * (1.0 + 0.5 * dilation + by_l * l_down) + glide_down / flux,
+            y_across - base_slope * l_across,
+            share * by_l * l_across + glide_across / flux,
+        )
+
+
+def _labels(grid: TrajectoryGrid, around: Index) -> tuple[Array, NDArray[np.bool_]]:
+    """Labels (k, n) of neighbours on the curve, to a factor for each row, and whether they are in one piece (n - 1)."""
+    state = grid.states[around]
+    place = np.where(state[..., S_L] > -7.0, state[..., S_L], -7.0 + 0.1 * (state[..., S_L] + 7.0))
+    apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / tables(grid.model).scale)
+    gaps = np.diff(state[..., S_T], axis=1)
+    told = (gaps > _TOLD).all(axis=1, keepdims=True)
+    gaps = np.where(told, gaps, np.maximum(apart, 1e-14))
+    joined = apart < _APART * grid.refinement.delta
+    labels = np.concatenate([np.zeros((len(around), 1)), np.cumsum(gaps, axis=1)], axis=1)
+    return labels, joined
+
+
+def _across(grid: TrajectoryGrid, places: Index, rows: Index) -> Array:
+    """Derivatives (3, k) of L, y and G along the curve at states, per gap between the inner neighbours."""
+    low, high = grid.first[rows], grid.first[rows + 1] - 1
+    around = np.clip(places[:, None] + np.arange(-2, 3), low[:, None], high[:, None])
+    labels, joined = _labels(grid, around)
+    joined &= np.diff(around, axis=1) > 0
+    values = grid.states[around][..., [S_L, S_Y, S_G]]
+    gaps = np.diff(labels, axis=1)
+    out = np.zeros((len(places), 3))
+    unit = np.where(joined[:, 1], gaps[:, 1], gaps[:, 2])
+    five = joined.all(axis=1) & (gaps.max(axis=1) < _EVEN * gaps.min(axis=1))
+    three = joined[:, 1:3].all(axis=1) & ~five
+    for which, columns in ((five, slice(0, 5)), (three, slice(1, 4))):
+        if which.any():
+            at = (labels[which] - labels[which, 2:3])[:, columns] / unit[which, None]
+            out[which] = np.einsum("kn,knq->kq", _slope_weights(at), values[which][:, columns])
+    left, right = joined[:, 1] & ~three & ~five, joined[:, 2] & ~joined[:, 1]
+    out[left] = values[left, 2] - values[left, 1]
+    out[right] = values[right, 3] - values[right, 2]
+    # The same label from neighbour to neighbour: derivatives of one state are compared with each other alone.
+    return out.T
+
+
+def _slope_weights(at: Array) -> Array:
+    """Weights (k, n) of the derivative at 0, one of the places ``at`` (k, n), of the polynomial through values there."""
+    count = at.shape[1]
+    middle = count // 2
+    out = np.zeros_like(at)
+    others = [i for i in range(count) if i != middle]
+    for i in others:
+        rest = [j for j in others if j != i]
+        out[:, i] = np.prod(-at[:, rest] / (at[:, [i]] - at[:, rest]), axis=1) / at[:, i]
+    out[:, middle] = -out[:, others].sum(axis=1)
+    return out
+
+
+def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) -> tuple[Array, Array, Array]:
+    """ln Q, ln T_surface and the share of the way at zeros between states ``left`` and the next: of the cubic through
+    four neighbours where they are in one piece and even enough, else on the line."""
+    around = left[:, None] + np.arange(-1, 3)
+    low, high = grid.first[rows], grid.first[rows + 1] - 1
+    inside = (around[:, 0] >= low) & (around[:, 3] <= high)
+    around = np.clip(around, low[:, None], high[:, None])
+    labels, joined = _labels(grid, around)
+    state = grid.states[around]
+    over = grid.overburden[rows][:, None]
+    model = grid.model
+    f, _ = model.closures(np.exp(state[..., S_L]))
+    root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
+    log_q = np.log(model.slip(f) * root_t * over + state[..., S_G])
+    excess = state[..., S_Y] - model.base_flux(f)
+    weights = np.zeros(around.shape)
+    weights[:, 1], weights[:, 2] = 1.0 - share, share
+    gaps = np.diff(labels, axis=1)
+    even = inside & joined.all(axis=1)
+    even &= (gaps[:, [0, 2]] < _EVEN * gaps[:, 1:2]).all(axis=1) & (gaps[:, [0, 2]] * _EVEN > gaps[:, 1:2]).all(axis=1)
+    if even.any():
+        at = ((labels[even] - labels[even, 1:2]) / gaps[even, 1:2]).T
+        place = zero_of_cubic(at, excess[even].T, np.zeros(at.shape[1]), share[even])
+        cubic = lagrange(at, place)
+        sound = np.abs(cubic).sum(axis=0) < _SOUND
+        even[even] = sound
+        weights[even] = cubic[:, sound].T
+        share = share.copy()
+        share[even] = place[sound]
+    return (log_q * weights).sum(axis=1), (state[..., S_T] * weights).sum(axis=1), share
+
+
+def lagrange(at: Array, x: Array) -> Array:
+    """Weights (4, n) of cubic interpolation at ``x`` (n,) from values at ``at`` (4, n)."""
+    off = x - at
+    weights = np.empty_like(off)
+    for i in range(4):
+        j, k, m = (other for other in range(4) if other != i)
+        numerator = off[j] * off[k] * off[m]
+        weights[i] = numerator / ((at[i] - at[j]) * (at[i] - at[k]) * (at[i] - at[m]))
+    return weights
+
+
+def zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
+    """Where between ``low`` and ``low`` + 1 the cubic through ``values`` (4, n) at ``at`` vanishes.
+
+    By regula falsi from ``x``; a cubic without change of sign there leaves it at an end.
+    """
+    high = low + 1.0
+    f_low, f_high = ((lagrange(at, end) * values).sum(axis=0) for end in (low, high))
+    for _ in range(3):
+        f = (lagrange(at, x) * values).sum(axis=0)
+        left = (f > 0.0) == (f_low > 0.0)
+        low, f_low = np.where(left, x, low), np.where(left, f, f_low)
+        high, f_high = np.where(left, high, x), np.where(left, f_high, f)
+        span = f_high - f_low
+        x = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
+    return x
+
+
+def _hermite(one: Array, two: Array, slope_one: Array, slope_two: Array, t: Array) -> Array:
+    rise = two - one
+    return one + t * rise + t * (1.0 - t) * ((1.0 - t) * (slope_one - rise) - t * (slope_two - rise))
+
+
+def _hermite_zero(one: Array, two: Array, slope_one: Array, slope_two: Array, t: Array) -> Array:
+    """Where the cubic vanishes between its ends, by regula falsi."""
+    low, high, f_low, f_high = np.zeros_like(t), np.ones_like(t), one, two
+    for _ in range(3):
+        f = _hermite(one, two, slope_one, slope_two, t)
+        left = (f > 0.0) == (one > 0.0)
+        low, f_low = np.where(left, t, low), np.where(left, f, f_low)
+        high, f_high = np.where(left, high, t), np.where(left, f_high, f)
+        span = f_high - f_low
+        t = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
+    return np.clip(t, 0.0, 1.0)
