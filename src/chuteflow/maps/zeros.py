@@ -146,7 +146,7 @@ def _labels(grid: TrajectoryGrid, around: Index) -> tuple[Array, NDArray[np.bool
     """Labels (k, n) of neighbours on the curve, to a factor for each row, and whether they are in one piece (n - 1)."""
     state = grid.states[around]
     place = np.where(state[..., S_L] > -7.0, state[..., S_L], -7.0 + 0.1 * (state[..., S_L] + 7.0))
-    apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / tables(grid.model).scale)
+    apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / grid.scale)
     gaps = np.diff(state[..., S_T], axis=1)
     told = (gaps > _TOLD).all(axis=1, keepdims=True)
     gaps = np.where(told, gaps, np.maximum(apart, 1e-14))

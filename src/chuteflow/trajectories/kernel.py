@@ -228,10 +228,12 @@ def _bend(rows: Any, j: int, n: int, open_: Any, length: Any, q: int) -> tuple[f
 
 
 @compiled
-def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: Any, length: Any) -> bool:
-    """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
+def _hides_zeros(
+    table: Any, base: int, rows: Any, before: float, last: float, j: int, n: int, open_: Any, length: Any
+) -> bool:
+    """Whether the residual of the base in a column of ``table``, ``before`` and ``last`` at the ends, may have zeros more between position j of the curve and the next than its signs there show:
     where it does along the cubic through the two states, or comes half of the way to it."""
-    before, last = residual[j], residual[j + 1]
+    alike = (before >= 0.0) == (last >= 0.0)
     least = min(abs(before), abs(last))
     rise_l, rise_y = rows[j + 1, S_L] - rows[j, S_L], rows[j + 1, S_Y] - rows[j, S_Y]
     left_l, right_l = _bend(rows, j, n, open_, length, S_L)
@@ -242,12 +244,12 @@ def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: A
         t = c / (_BETWEEN + 1.0)
         big_l = rows[j, S_L] + t * (rise_l + (1.0 - t) * ((1.0 - t) * left_l - t * right_l))
         y = rows[j, S_Y] + t * (rise_y + (1.0 - t) * ((1.0 - t) * left_y - t * right_y))
-        here = y - look_up(values, big_l, BASE)
+        here = y - look_up(table, big_l, base)
         changes += int((here >= 0.0) != (before >= 0.0))
         nearest = min(nearest, abs(here))
         before = here
     changes += int((last >= 0.0) != (before >= 0.0))
-    if (residual[j] >= 0.0) == (last >= 0.0):
+    if alike:
         return changes > 0 or nearest < 0.5 * least
     return changes > 1
 
@@ -300,22 +302,23 @@ def carry(
     per_flux: float,
     finest: float,
     most: int,
+    others: Any,
 ) -> tuple[Any, ...]:
     """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending.
 
+    Trajectories are inserted for the base in ``values``, and for those in the columns of ``others`` (entries, K).
+
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
-    where it was inserted, the first position of each row (R + 1,), zeros of B: left or upper position, right or lower
-    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), the first states of the cells that
-    could not be decided (U,), how many cells were looked at, and how the curve ended.
+    where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row (R + 1,),
+    the first states of the cells that could not be decided (U,), how many cells were looked at, and how the curve ended.
     """
     n = len(log_t)
     states = np.empty((64 * n + 1024, 5))
     came_from = np.empty(len(states))
+    goes_on = np.empty(len(states), np.bool_)
     first = np.zeros(len(overburden) + 1, np.int64)
-    zeros = np.empty((256, 3))
-    links = np.full((256, 2), -1, np.int64)
     undecided = np.empty(64, np.int64)
-    n_zeros = n_undecided = total = cells = 0
+    n_undecided = total = cells = 0
     status = DONE
 
     # The curve: n positions in use of these.
@@ -327,19 +330,13 @@ def carry(
     region = np.empty(len(rows), np.int64)
     residual = np.empty(len(rows))
     length = np.empty(len(rows))  # distance from the next position
-    edge = np.empty(len(rows), np.int64)  # zero between a position and the next
-    # The same positions in the row before: place among the states, residual, zero towards the next, and where they
-    # are now, since some are inserted between.
+    # The same positions in the row before: place among the states, and where they are now, since some are inserted
+    # between.
     above = np.full(len(rows), -1, np.int64)
-    above_residual = np.empty(len(rows))
-    above_edge = np.full(len(rows), -1, np.int64)
     moved = np.empty(len(rows), np.int64)
-    side = np.empty(len(rows), np.int64)  # zero of a trajectory since the row before
     wanted = np.empty(len(rows), np.int64)  # how many to insert after a position
     inserted = np.empty((len(rows), 5))
     lengths = np.empty((3, 3))
-    cell_nodes = np.empty(64, np.int64)
-    cell_places = np.empty((64, 2))
     theta[:n] = theta_s
     rows[:n, S_T] = log_t
 
@@ -381,7 +378,12 @@ def carry(
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
                 limited = length[j] > 2.0 * delta * (wanted[j] + 1)
             elif not in_series[j]:
-                doubtful = _hides_zeros(values, rows, residual, j, n, open_, length)
+                doubtful = _hides_zeros(values, BASE, rows, residual[j], residual[j + 1], j, n, open_, length)
+                for b in range(others.shape[1]):
+                    if not doubtful:
+                        before = rows[j, S_Y] - look_up(others, rows[j, S_L], b)
+                        last = rows[j + 1, S_Y] - look_up(others, rows[j + 1, S_L], b)
+                        doubtful = _hides_zeros(others, b, rows, before, last, j, n, open_, length)
                 wanted[j] = 1 if doubtful and length[j] > finest else 0
                 limited = doubtful and length[j] <= finest
             if limited:
@@ -396,6 +398,7 @@ def carry(
         m = n + extra
         states = _grown(states, total + m)
         came_from = _grown(came_from, total + m)
+        goes_on = _grown(goes_on, total + m)
         for j in range(n):
             moved[j] = j
         if extra > 0:
@@ -418,13 +421,7 @@ def carry(
                     _grown(residual, m),
                     _grown(length, m),
                 )
-                edge, above, above_residual = _grown(edge, m), _grown(above, m), _grown(above_residual, m)
-                above_edge, moved, side, wanted = (
-                    _grown(above_edge, m),
-                    _grown(moved, m),
-                    _grown(side, m),
-                    _grown(wanted, m),
-                )
+                above, moved, wanted = _grown(above, m), _grown(moved, m), _grown(wanted, m)
             # From the end of the curve, so that nothing is overwritten before it has moved.
             at = m
             for j in range(n - 1, -1, -1):
@@ -452,75 +449,22 @@ def carry(
         for j in range(m):
             for q in range(5):
                 states[total + j, q] = rows[j, q]
+            goes_on[total + j] = open_[j]
         first[row] = total
-        # Zeros between trajectories at this depth.
-        zeros = _grown(zeros, n_zeros + 2 * m)
-        before = len(links)
-        links = _grown(links, n_zeros + 2 * m)
-        links[before:] = -1
-        for j in range(m):
-            edge[j] = -1
-            if j + 1 < m and open_[j] and (residual[j] >= 0.0) != (residual[j + 1] >= 0.0):
-                zeros[n_zeros, 0] = total + j
-                zeros[n_zeros, 1] = total + j + 1
-                zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
-                edge[j] = n_zeros
-                n_zeros += 1
-        # Zeros along trajectories since the row before, and lines through the cells between the rows.
-        if row > 0:
-            for j in range(n):
-                side[j] = -1
-                now = residual[moved[j]]
-                if (above_residual[j] >= 0.0) != (now >= 0.0):
-                    zeros[n_zeros, 0] = above[j]
-                    zeros[n_zeros, 1] = total + moved[j]
-                    zeros[n_zeros, 2] = above_residual[j] / (above_residual[j] - now)
-                    side[j] = n_zeros
-                    n_zeros += 1
-            for j in range(n - 1):
-                if not open_[moved[j]]:
-                    continue
-                count = 0
-                if above_edge[j] >= 0:
-                    cell_nodes[0] = above_edge[j]
-                    cell_places[0, 0] = zeros[above_edge[j], 2]
-                    cell_places[0, 1] = 0.0
-                    count = 1
-                if side[j + 1] >= 0:
-                    cell_nodes[count] = side[j + 1]
-                    cell_places[count, 0] = 1.0
-                    cell_places[count, 1] = zeros[side[j + 1], 2]
-                    count += 1
-                width = moved[j + 1] - moved[j]
-                for c in range(width - 1, -1, -1):
-                    e = edge[moved[j] + c]
-                    if e >= 0:
-                        cell_nodes[count] = e
-                        cell_places[count, 0] = (c + zeros[e, 2]) / width
-                        cell_places[count, 1] = 1.0
-                        count += 1
-                if side[j] >= 0:
-                    cell_nodes[count] = side[j]
-                    cell_places[count, 0] = 0.0
-                    cell_places[count, 1] = zeros[side[j], 2]
-                    count += 1
-                _match(cell_nodes, cell_places, count, links)
         # Close the curve where both ends of an interval lie in one invariant region, and drop what is closed in.
         at = 0
         joined = False  # to the position before
         for j in range(m):
-            goes_on = j + 1 < m and open_[j] and not (region[j] != FREE and region[j] == region[j + 1])
-            if joined or goes_on:
+            ahead = j + 1 < m and open_[j] and not (region[j] != FREE and region[j] == region[j + 1])
+            if joined or ahead:
                 if at < j:
                     for q in range(5):
                         rows[at, q] = rows[j, q]
                     theta[at], in_series[at], frozen[at] = theta[j], in_series[j], frozen[j]
-                open_[at] = goes_on
+                open_[at] = ahead
                 above[at] = total + j
-                above_residual[at] = residual[j]
-                above_edge[at] = edge[j]
                 at += 1
-            joined = goes_on
+            joined = ahead
         n = at
         total += m
         first[row + 1] = total
@@ -530,13 +474,87 @@ def carry(
     return (
         states[:total],
         came_from[:total],
+        goes_on[:total],
         first,
-        zeros[:n_zeros],
-        links[:n_zeros],
         undecided[:n_undecided],
         cells,
         status,
     )
+
+
+@compiled
+def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any) -> tuple[Any, Any]:
+    """The zeros of B of the base in a column of ``table``: left or upper state, right or lower state, fraction
+    between (Z, 3); and their neighbours along the zero set (Z, 2)."""
+    total = len(states)
+    residual = np.empty(total)
+    for i in range(total):
+        residual[i] = states[i, S_Y] - look_up(table, states[i, S_L], base)
+    zeros = np.empty((256, 3))
+    links = np.full((256, 2), -1, np.int64)
+    n_zeros = 0
+    edge = np.full(total, -1, np.int64)  # zero between a state and the next
+    side = np.full(total, -1, np.int64)  # zero of a trajectory since the row before
+    cell_nodes = np.empty(64, np.int64)
+    cell_places = np.empty((64, 2))
+    for row in range(len(first) - 1):
+        begin, end = first[row], first[row + 1]
+        zeros = _grown(zeros, n_zeros + 2 * (end - begin))
+        before = len(links)
+        links = _grown(links, n_zeros + 2 * (end - begin))
+        links[before:] = -1
+        for i in range(begin, end - 1):
+            if goes_on[i] and (residual[i] >= 0.0) != (residual[i + 1] >= 0.0):
+                zeros[n_zeros, 0] = i
+                zeros[n_zeros, 1] = i + 1
+                zeros[n_zeros, 2] = residual[i] / (residual[i] - residual[i + 1])
+                edge[i] = n_zeros
+                n_zeros += 1
+        if row == 0:
+            continue
+        for i in range(begin, end):
+            above = int(came_from[i])
+            if above == came_from[i] and (residual[above] >= 0.0) != (residual[i] >= 0.0):
+                zeros[n_zeros, 0] = above
+                zeros[n_zeros, 1] = i
+                zeros[n_zeros, 2] = residual[above] / (residual[above] - residual[i])
+                side[i] = n_zeros
+                n_zeros += 1
+        # Lines through the cells between the rows.
+        left = begin
+        while left < end - 1:
+            right = left + 1
+            while right < end and came_from[right] != int(came_from[right]):
+                right += 1
+            if right < end and goes_on[left]:
+                count = 0
+                above = edge[int(came_from[left])]
+                if above >= 0:
+                    cell_nodes[0] = above
+                    cell_places[0, 0] = zeros[above, 2]
+                    cell_places[0, 1] = 0.0
+                    count = 1
+                if side[right] >= 0:
+                    cell_nodes[count] = side[right]
+                    cell_places[count, 0] = 1.0
+                    cell_places[count, 1] = zeros[side[right], 2]
+                    count += 1
+                width = right - left
+                for c in range(width - 1, -1, -1):
+                    e = edge[left + c]
+                    if e >= 0:
+                        cell_nodes[count] = e
+                        cell_places[count, 0] = (c + zeros[e, 2]) / width
+                        cell_places[count, 1] = 1.0
+                        count += 1
+                if side[left] >= 0:
+                    cell_nodes[count] = side[left]
+                    cell_places[count, 0] = 0.0
+                    cell_places[count, 1] = zeros[side[left], 2]
+                    count += 1
+                _match(cell_nodes, cell_places, count, links)
+            left = right
+    return zeros[:n_zeros], links[:n_zeros]
 
 
 @compiled

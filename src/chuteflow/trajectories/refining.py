@@ -11,7 +11,8 @@ trajectory leaves, and in which B has one sign (:func:`chuteflow.trajectories.ke
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -26,7 +27,7 @@ from chuteflow.steady.solver import default_stretch
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.kernel import S_G, S_H, S_L, S_T, START
 from chuteflow.trajectories.surface import surface_potential
-from chuteflow.trajectories.tables import Tables, tables
+from chuteflow.trajectories.tables import BASE, Tables, served, tables
 
 Index = NDArray[np.int64]
 
@@ -59,6 +60,8 @@ REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
 _THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
+#: Surface temperatures whose logarithms are nearer are one.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,9 @@ class TrajectoryGrid:
 
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
     curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
-    row before, between two states where it was inserted. ``zeros`` (Z, 3) are the two states between which B vanishes,
+    row before, between two states where it was inserted; ``goes_on`` (N,) tells whether the curve goes on to the next
+    state. The trajectories serve every base between those that they were refined for, and heat fluxes are told apart
+    by their ``scale``: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3) are the two states between which B vanishes,
     and the fraction of the way. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the
     first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or
     they are too long.
@@ -97,12 +102,21 @@ class TrajectoryGrid:
     overburden: Array
     states: Array
     came_from: Array
+    goes_on: NDArray[np.bool_]
     first: Index
+    scale: float
     zeros: Array
     links: Index
     cells: int
     undecided: Index
     complete: bool
+
+    def of_base(self, problem: Model) -> TrajectoryGrid:
+        """The same trajectories with the zeros of B for the base of ``problem``."""
+        zeros, links = kernel.zeros_of(
+            tables(problem).values, BASE, self.states, self.came_from, self.goes_on, self.first
+        )
+        return replace(self, model=problem, zeros=zeros, links=links)
 
     @property
     def deepest(self) -> float:
@@ -137,15 +151,19 @@ class TrajectoryGrid:
     @cached_property
     def branches(self) -> tuple[RoughBranch, ...]:
         """The branches of flows, the longest first."""
+        return tuple(RoughBranch(self, zeros, self.macroscopic[zeros], closed) for zeros, closed in self.lines)
+
+    @cached_property
+    def lines(self) -> tuple[tuple[Index, bool], ...]:
+        """The zeros in order along each branch of flows, the longest first, and whether it is closed: then the last is
+        the first."""
         order, starts = kernel.walk(self.links)
         found = []
         for begin, end in pairwise(starts.tolist()):
             zeros = order[begin:end]
             closed = bool(len(zeros) > 2 and self.links[zeros[0], 1] >= 0)
-            if closed:
-                zeros = np.append(zeros, zeros[0])
-            found.append(RoughBranch(self, zeros, self.macroscopic[zeros], closed))
-        return tuple(sorted(found, key=len, reverse=True))
+            found.append((np.append(zeros, zeros[0]) if closed else zeros, closed))
+        return tuple(sorted(found, key=lambda line: len(line[0]), reverse=True))
 
     def start(self, zero: int) -> Elements:
         """The rough flow at a zero, on elements."""
@@ -180,19 +198,45 @@ def carry_down(
 ) -> TrajectoryGrid:
     """The grid of trajectories of ``model`` from surface temperatures ``coldest`` to ``hottest`` down to the hold-up
     ``deepest``. Those of the last few chutes are remembered: one asks for other flows of the same chute next."""
-    t = tables(model)
+    return carry_down_for((model,), coldest, hottest, deepest, (), refinement)
+
+
+def carry_down_for(
+    models: Sequence[Model],
+    coldest: float,
+    hottest: float,
+    deepest: float,
+    asked: Sequence[float],
+    refinement: Refinement = REFINEMENT,
+) -> TrajectoryGrid:
+    """The grid of trajectories that serves all ``models``, which differ by their base alone, and those with bases
+    between them; its zeros are of the first. Surface temperatures that are ``asked`` for have a trajectory of their
+    own."""
+    model, t = models[0], tables(models[0])
+    scale = max(one.flux_scale for one in models)
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
     overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
     decades = np.log10(hottest / coldest)
     temperature = np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
-    states, came_from, first, zeros, links, undecided, cells, status = kernel.carry(
-        t.values, t.bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
+    if asked:
+        temperature = _with_asked(temperature, asked)
+    bounds, others = served(models)
+    states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
+        t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
-        refinement.delta, 1.0 / t.scale, refinement.finest, refinement.most,
+        refinement.delta, 1.0 / scale, refinement.finest, refinement.most, others,
     )  # fmt: skip
+    zeros, links = kernel.zeros_of(t.values, BASE, states, came_from, goes_on, first)
     return TrajectoryGrid(
-        model, refinement, overburden, states, came_from, first, zeros, links, cells, undecided, status == kernel.DONE
-    )
+        model, refinement, overburden, states, came_from, goes_on, first, scale, zeros, links, cells, undecided,
+        status == kernel.DONE,
+    )  # fmt: skip
+
+
+def _with_asked(temperature: Array, asked: Sequence[float]) -> Array:
+    """The temperatures, and those asked for in place of such as are as good as the same."""
+    apart = np.abs(np.log(temperature[:, None] / np.asarray(asked)[None, :])).min(axis=1)
+    return np.unique(np.concatenate([temperature[apart > _SAME], asked]))
 
 
 def _start_at_most(t: Tables) -> float:

@@ -6,13 +6,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from chuteflow.numerics.tabulate import Array
-from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
+from chuteflow.numerics.tabulate import Array, Table
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model, evaluate_closures
 
 #: The table runs over LOW <= ln x <= LOW + (ENTRIES - 1)/PER_UNIT; outside, the functions are constant.
 LOW, PER_UNIT, ENTRIES = -25.0, 48.0, 4096
@@ -41,10 +42,17 @@ class Tables:
     scale: float
 
 
+@lru_cache(maxsize=4)
+def _closures(table: Table) -> Array:
+    """The closures (8, entries) of all chutes with the same grains."""
+    f, _ = evaluate_closures(table, np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
+    return f
+
+
 @lru_cache(maxsize=64)
 def tables(model: Model) -> Tables:
     """The tables of ``model``."""
-    f, _ = model.closures(np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
+    f = _closures(model.table)
     conduction, coupling = f[CONDUCTION], f[COUPLING]
     net = f[LOSS] - model.slope**2 * f[WORK]
     base = model.base_flux(f)
@@ -63,3 +71,16 @@ def tables(model: Model) -> Tables:
     )  # fmt: skip
     rate = float(np.sqrt(2.0 * np.abs(net) / conduction).max())
     return Tables(values, bounds, rate, model.flux_scale)
+
+
+def served(models: Sequence[Model]) -> tuple[Array, Array]:
+    """The bounds that hold for the bases of all ``models``, whose grains, slope and surface are the same, and the heat
+    fluxes (entries, models - 1) of all but the first."""
+    every = [tables(one) for one in models]
+    bounds = every[0].bounds
+    if len(every) > 1:
+        bounds = bounds.copy()
+        for column, extreme in ((BASE_LOW, np.min), (BASE_HIGH, np.max), (BASE_ABOVE, np.min)):
+            bounds[:, column] = extreme([t.bounds[:, column] for t in every], axis=0)
+    others = np.array([t.values[:, BASE] for t in every[1:]]).reshape(len(every) - 1, ENTRIES).T
+    return bounds, np.ascontiguousarray(others)
