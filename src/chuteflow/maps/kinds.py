@@ -1,38 +1,17 @@
-"""What flows a base has on a fan: how many, of which kinds, and in how many families.
-
-# notation: B the heat flux of a trajectory less that which the base gives, whose zeros are the flows.
-"""
+"""What flows a base has on a grid of trajectories: how many, of which kinds, and in how many families."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from contourpy import contour_generator
 from numpy.typing import NDArray
 
 from chuteflow.branches.rough_turns import dips
-from chuteflow.maps.fan import (
-    EXCESS,
-    GRIPPED,
-    HEAT_FLUX,
-    LOG_GLIDE,
-    LOG_MASS,
-    LOG_SLIP,
-    NET_HIGH,
-    NET_LOW,
-    OF_FLUX,
-    OF_GLIDE,
-    OF_SLIP,
-    STEEPEST,
-    SURE_HIGH,
-    SURE_LOW,
-    SURE_STEEP,
-    Base,
-    Fan,
-    lagrange,
-)
+from chuteflow.maps.zeros import Index, Zeros, lagrange, thinned, zeros_on
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.trajectories.refining import TrajectoryGrid
 
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
@@ -43,15 +22,6 @@ _TURN = 1e-6
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
 _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
-#: Closed lines that span fewer columns and rows are none; those that span more are, wherever they are; those in
-#: between only so many columns or rows beside other lines.
-_SMALLEST_LOOP, _SMALL_LOOP, _BESIDE = 1.5, 6.0, 8.0
-#: Points of a family that lie nearer, in steps of the grid, say nothing more.
-_NEAR = 0.3
-#: Cubic interpolation is used where neighbouring steps of the grid differ by less than this factor.
-_EVEN = 12.0
-#: Weights of a cubic whose sizes sum to more extrapolate.
-_SOUND = 3.0
 
 
 @dataclass(frozen=True)
@@ -70,174 +40,59 @@ class Kinds:
     density: int
 
 
-def kinds(fan: Fan, base: Base) -> Kinds:
-    """The kinds of the flows that ``base`` has on ``fan``."""
-    excess = fan.of_base(base)
-    at = _exists(excess[:, fan.place])
-    lines = _families([np.asarray(line) for line in contour_generator(z=excess).lines(0.0)])
+def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> Kinds:
+    """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
+    of :func:`chuteflow.maps.zeros.extremes_on`."""
+    lines = [line for line, _ in grid.lines if len(line) > 1]
     if not lines:
-        return Kinds(at, 0, 0, 0, 0)
-    chains = [_selected(line) for line in lines]
-    zeros = _at_zeros(fan, excess, np.concatenate(chains))
-    fields = zeros.fields
-    slip = np.maximum(fields[HEAT_FLUX] + base.loss, 1e-300) / fan.slope
-    log_flux = np.logaddexp(fields[LOG_SLIP] + np.log(slip), fields[LOG_GLIDE])
-    rise = _rise(fan, base, zeros, np.exp(fields[LOG_SLIP] - log_flux) * slip)
-    ends = np.cumsum([len(chain) for chain in chains])
+        return Kinds((False,) * len(temperatures), 0, 0, 0, 0)
+    zeros = zeros_on(grid, extremes)
+    at = np.zeros(len(temperatures), dtype=bool)
     pieces, interior, density = [], 0, 0
-    for first, last in zip(ends - [len(chain) for chain in chains], ends, strict=True):
-        part = slice(first, last)
-        pieces.append(_monotonic_pieces(zeros.log_t[part], fields[LOG_MASS, part], log_flux[part], rise[part]))
-        holdup = np.exp(fields[LOG_MASS, part])
-        interior |= _interiors(fields[:, part], zeros.doubt[:, part], holdup)
-        density |= _densities(fields[:, part], zeros.doubt[2, part], holdup)
-    return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
+    for line in lines:
+        hotter = zeros.log_t[line, None] >= np.log(temperatures)
+        at |= hotter.any(axis=0) & ~hotter.all(axis=0)
+        kept = line[thinned(np.stack([zeros.log_q[line], zeros.log_m[line], zeros.log_t[line]], axis=1))]
+        pieces.append(_monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept]))
+        found = _present(zeros, kept)
+        interior |= sum(bit for bit, there in zip(INTERIORS.values(), found[:3], strict=True) if there)
+        density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
+    return Kinds(tuple(map(bool, at.tolist())), _most(np.concatenate(pieces)), len(lines), interior, density)
 
 
-def _families(lines: list[Array]) -> list[Array]:
-    """The lines (k, 2) that are families of their own.
+def _present(zeros: Zeros, line: Index) -> list[bool]:
+    """Whether the kinds, in the order of INTERIORS and DENSITIES, are among the flows of a line of zeros.
 
-    Interpolation makes a loop of a dip that stops short of zero, and a string of beads of a tongue of a family that
-    is narrower than the grid: small loops beside other lines are no families.
+    Where the bounds of a trajectory that was inserted leave it open, the trajectory is followed back.
     """
-    extent = [float(np.ptp(line, axis=0).max()) if _is_closed(line) else np.inf for line in lines]
-    large = [line for line, size in zip(lines, extent, strict=True) if size > _SMALL_LOOP and len(line) > 1]
-    small = [line for line, size in zip(lines, extent, strict=True) if _SMALLEST_LOOP < size <= _SMALL_LOOP]
-    beads: list[Array] = [line for line, size in zip(lines, extent, strict=True) if size <= _SMALLEST_LOOP]
-    while beside := [line for line in small if any(_are_near(line, other) for other in (*large, *beads))]:
-        beads += beside
-        small = [line for line in small if not any(line is other for other in beside)]
-    return large + small
+    lower, upper = zeros.extremes[line, :3].T, zeros.extremes[line, 3:].T
+    doubt, holdup = zeros.doubt[line].T, np.exp(zeros.log_m[line])
+    rounding = _BALANCE * float(np.abs(zeros.extremes[line][:, [0, 1, 3, 4]]).max()) * (1.0 + holdup / _DEEP)
+    doubt[:2] += rounding
+    doubt[2] += _RISE * holdup
+    surely, perhaps = _margins(lower, upper, doubt), _margins(upper, lower, doubt)
+    found = [_peak(margin) > 0.0 for margin in surely]
+    open_ = np.zeros(len(line), dtype=bool)
+    for there, margin in zip(found, perhaps, strict=True):
+        open_ |= (margin > 0.0) & (not there)
+    if open_.any():
+        known = zeros.traced(line[open_]).T
+        margins = _margins(known, known, doubt[:, open_])
+        found = [there or bool((margin > 0.0).any()) for there, margin in zip(found, margins, strict=True)]
+    return found
 
 
-def _is_closed(line: Array) -> bool:
-    return bool((line[0] == line[-1]).all())
-
-
-def _are_near(loop: Array, line: Array) -> bool:
-    off = np.abs(line - loop.mean(axis=0))
-    return bool(((off[:, 0] < _BESIDE) & (off[:, 1] < _BESIDE)).any())
-
-
-def _rise(fan: Fan, base: Base, zeros: _Zeros, slipping: Array) -> Array:
-    """Derivative of ln Q along the zero set, to a factor of one sign on each line; ``slipping`` is the share of
-    the flux at the slip velocity."""
-    size = np.abs(zeros.down).sum(axis=0) + np.abs(zeros.across).sum(axis=0)
-    slopes = []
-    for of in (zeros.down, zeros.across):
-        flux = slipping * (of[OF_SLIP] + of[OF_FLUX] / np.maximum(zeros.fields[HEAT_FLUX] + base.loss, 1e-300))
-        slopes.append((flux + (1.0 - slipping) * of[OF_GLIDE], of[EXCESS] + base.weight * of[GRIPPED]))
-    (flux_down, excess_down), (flux_across, excess_across) = slopes
-    return (flux_across * excess_down - flux_down * excess_across) / size
-
-
-def _exists(excess: Array) -> tuple[bool, ...]:
-    """Whether columns (K, T) have a zero, also between rows, where a parabola through three has one."""
-    positive = excess > 0.0
-    found = positive.any(axis=0) & ~positive.all(axis=0)
-    size = np.abs(excess)
-    before, here, after = size[:-2], size[1:-1], size[2:]
-    bend = before - 2.0 * here + after
-    dip = (here <= before) & (here <= after) & (bend > 0.0)
-    lowest = here - (after - before) ** 2 / (8.0 * np.where(dip, bend, 1.0))
-    found |= (dip & (lowest < 0.0)).any(axis=0)
-    return tuple(map(bool, np.atleast_1d(found).tolist()))
-
-
-def _selected(line: Array) -> Array:
-    """Of the vertices (k, 2) of a line in columns and rows, those on the edges that it crosses more squarely."""
-    ahead = np.empty_like(line)
-    ahead[1:-1] = line[2:] - line[:-2]
-    ahead[0], ahead[-1] = line[1] - line[0], line[-1] - line[-2]
-    on_column = line[:, 0] == np.rint(line[:, 0])
-    keep = on_column == (np.abs(ahead[:, 0]) >= 0.7 * np.abs(ahead[:, 1]))
-    keep[[0, -1]] = True
-    kept = line[keep]
-    while len(kept) > 3:
-        near = np.hypot(*np.diff(kept, axis=0).T) < _NEAR
-        near[1:] &= ~near[:-1]
-        drop = np.flatnonzero(near) + 1
-        drop = np.where(drop == len(kept) - 1, drop - 1, drop)
-        if not drop.size:
-            break
-        kept = np.delete(kept, drop, axis=0)
-    return kept
-
-
-@dataclass(frozen=True, eq=False)
-class _Zeros:
-    """What there is at k points of the zero set: ``fields`` (10, k), ``down`` and ``across`` (5, k) of a fan there,
-    ``log_t`` (k,), and how far the net losses and the largest v are in ``doubt`` (3, k)."""
-
-    fields: Array
-    down: Array
-    across: Array
-    log_t: Array
-    doubt: Array
-
-
-def _at_zeros(fan: Fan, excess: Array, line: Array) -> _Zeros:
-    """What ``fan`` has at vertices (k, 2) on edges of the grid.
-
-    The zero on an edge is that of the cubic through four values in line with it, where the grid is even enough.
-    """
-    column, row = np.floor(line).astype(np.intp).T
-    on_column = line[:, 0] == column
-    share = np.where(on_column, line[:, 1] - row, line[:, 0] - column)
-    _rows, columns = excess.shape
-    start = np.where(on_column, row, column)
-    # Of four values in line, where possible two to each side.
-    first = np.clip(start - 1, 0, np.where(on_column, fan.last[column], columns - 1) - 3)
-    aside = np.clip(start - first, 0, 2)
-    along = first + np.arange(4)[:, None]
-    r, c = np.where(on_column, along, row), np.where(on_column, column, along)
-    widths = np.where(on_column, np.diff(fan.log_mass[r, c], axis=0), fan.gaps[np.minimum(c[:3], columns - 2)])
-    here = np.arange(len(line))
-    unit = widths[aside, here]
-    even = (widths > unit / _EVEN).all(axis=0) & (widths < unit * _EVEN).all(axis=0) & (start - first == aside)
-    values = excess[r, c]
-    weights = np.zeros(values.shape)
-    weights[aside, here], weights[aside + 1, here] = 1.0 - share, share
-    if even.any():
-        at = np.concatenate([np.zeros((1, len(line))), np.cumsum(widths, axis=0)])[:, even] / unit[even]
-        low = at[aside[even], np.arange(at.shape[1])]
-        cubic = lagrange(at, _zero_of_cubic(at, values[:, even], low, low + share[even]))
-        # Between the inner two of four values these weights are small; a cubic without a zero there has none.
-        sound = np.abs(cubic).sum(axis=0) < _SOUND
-        even[even] = sound
-        weights[:, even] = cubic[:, sound]
-    values = fan.fields[:, r, c]
-    fields = (values * weights).sum(axis=1)
-    # Where there is no cubic, half of what lies between the ends of an edge; else what the cubic differs by.
-    doubtful = slice(NET_LOW, STEEPEST + 1)
-    ends = values[doubtful, aside, here], values[doubtful, aside + 1, here]
-    chord = ends[0] + share * (ends[1] - ends[0])
-    doubt = np.where(even, np.abs(fields[doubtful] - chord), 0.5 * np.abs(ends[1] - ends[0]))
-    log_t = fan.spacing * np.append(0.0, np.cumsum(fan.gaps))
-    pair = r[aside, here], c[aside, here], r[aside + 1, here], c[aside + 1, here]
-
-    def along_edge(of: Array) -> Array:
-        start, stop = of[:, pair[0], pair[1]], of[:, pair[2], pair[3]]
-        return start + share * (stop - start)
-
-    return _Zeros(fields, along_edge(fan.down), along_edge(fan.across), (log_t[c] * weights).sum(axis=0), doubt)
-
-
-def _zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
-    """Where between ``low`` and ``low`` + 1 the cubic through ``values`` (4, n) at ``at`` vanishes.
-
-    By regula falsi from ``x``; a cubic without change of sign there leaves it at an end.
-    """
-    high = low + 1.0
-    f_low, f_high = ((lagrange(at, end) * values).sum(axis=0) for end in (low, high))
-    for _ in range(3):
-        f = (lagrange(at, x) * values).sum(axis=0)
-        left = (f > 0.0) == (f_low > 0.0)
-        low, f_low = np.where(left, x, low), np.where(left, f, f_low)
-        high, f_high = np.where(left, high, x), np.where(left, f_high, f)
-        span = f_high - f_low
-        x = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
-    return x
+def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
+    """By how much flows are of each kind, (k,) each, given bounds (3, k) of the least and the largest net loss and the
+    largest p dtheta/dp, and the doubt about these (3, k): a sign in doubt makes no flow mixed and no density
+    inverted."""
+    return [
+        lower[0] + doubt[0],
+        np.minimum(-upper[0] - doubt[0], lower[1] - doubt[1]),
+        doubt[1] - upper[1],
+        1.0 + 1e-12 - upper[2],
+        lower[2] - doubt[2] - 1.0,
+    ]
 
 
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> Array:
@@ -302,31 +157,6 @@ def _most(pieces: Array) -> int:
     edges = np.concatenate([low + _TURN, high])
     order = np.lexsort((np.repeat([1, 0], len(low)), edges))
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
-
-
-def _interiors(fields: Array, doubt: Array, holdup: Array) -> int:
-    """Bits of INTERIORS; a net loss whose sign is in ``doubt`` (2 or more, k) does not make a flow mixed."""
-    found = 0
-    scale = float(np.abs(fields[[NET_LOW, NET_HIGH]]).max())
-    rounding = _BALANCE * scale * (1.0 + holdup / _DEEP)
-    gain, loss = doubt[0] + rounding, doubt[1] + rounding
-    if _peak(fields[NET_LOW] + gain) >= 0.0:
-        found |= INTERIORS["dissipative"]
-    if _peak(loss - fields[NET_HIGH]) >= 0.0:
-        found |= INTERIORS["productive"]
-    if _peak(np.minimum(-fields[SURE_LOW] - gain, fields[SURE_HIGH] - loss)) > 0.0:
-        found |= INTERIORS["mixed"]
-    return found
-
-
-def _densities(fields: Array, doubt: Array, holdup: Array) -> int:
-    """Bits of DENSITIES; a rise that is in ``doubt`` (k,) does not make a density inverted."""
-    found = 0
-    if _peak(1.0 - fields[STEEPEST]) >= 0.0:
-        found |= DENSITIES["monotonic"]
-    if _peak(fields[SURE_STEEP] - doubt - 1.0 - _RISE * holdup) > 0.0:
-        found |= DENSITIES["inverted"]
-    return found
 
 
 def _peak(values: Array) -> float:

@@ -1,7 +1,7 @@
 """A plane of two parameters of a chute, and what a point of it is classified by.
 
 Along one axis, ``inner``, points are cheap: where it is a parameter of the base, all points of a column share
-one fan of trajectories.
+one grid of trajectories.
 """
 
 from __future__ import annotations
@@ -15,13 +15,17 @@ import numpy as np
 from chuteflow.branches.ranges import Range
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.maps.fan import Base, Fan, fan
 from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
+from chuteflow.maps.zeros import extremes_on
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
+from chuteflow.steady.model import model
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 from chuteflow.theory.laws import law
+from chuteflow.trajectories.refining import TrajectoryGrid, carry_down_for, starts
+from chuteflow.trajectories.tables import ENTRIES, envelope
 
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
 #: for. All but the first two are 1 where there are such flows, else 0.
@@ -32,10 +36,10 @@ SUMMARY = ("hot", "most", "families", "interior", "density")
 #: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
 #: each bound a point is.
 HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
-#: Columns of surface temperature to a decade.
-_PER_DECADE = 12
-#: Bases between the ends of an axis, which bound what a fan has to serve.
-_BETWEEN = 5
+#: Bases along an axis, which bound those that a grid has to serve.
+_BETWEEN = 9
+#: Surface temperatures whose logarithms are nearer are one.
+_SAME = 1e-6
 
 #: The class of a point: integers in the order of CODES, then 0 or 1 for each temperature; or that of HOT_CODES.
 Code = tuple[int, ...]
@@ -137,7 +141,8 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
-    return kinds(_fan(plane, replace(chute, **_neutral(plane)), law(chute.closure)), Base.of(chute))
+    grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), law(chute.closure))
+    return kinds(grid.of_base(model(chute)), extremes, plane.temperatures)
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:
@@ -162,20 +167,28 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _neutral(plane: Plane) -> dict[str, Any]:
-    """Fixed values of those parameters that one fan serves all values of."""
-    return {axis.name: axis.low for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
+    """Values in the middle of those parameters that one grid serves all values of."""
+    return {axis.name: float(axis.at(0.5)) for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
 
 
 @lru_cache(maxsize=4)
-def _fan(plane: Plane, chute: Chute, registered: Law) -> Fan:
-    """The fan of all points of ``plane`` whose grains, with their law, and slope are those of ``chute``."""
+def _grid(plane: Plane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
+    """The grid of trajectories of all points of ``plane`` whose grains, with their law, and slope are those of
+    ``chute``, and its extremes."""
     del registered  # known here to tell what is remembered of one law from that of another
     served = [chute]
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:
             shares = np.linspace(0.0, 1.0, _BETWEEN)
             served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
-    return fan(chute, [Base.of(base) for base in served], plane.within, np.array(plane.temperatures), _PER_DECADE)
+    within = plane.within
+    temperature = starts(within.coldest, within.hottest)
+    if plane.temperatures:
+        apart = np.abs(np.log(temperature[:, None] / np.array(plane.temperatures))).min(axis=1)
+        temperature = np.unique(np.concatenate([temperature[apart > _SAME], plane.temperatures]))
+    others = envelope([model(base) for base in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
+    grid = carry_down_for(model(chute), others, temperature, within.deepest)
+    return grid, extremes_on(grid)
 
 
 @lru_cache(maxsize=64)

@@ -1,7 +1,7 @@
 """The flows that a grid of trajectories shows, as accurately as the grid allows without solving any.
 
-# notation: P overburden, p normal stress, L, y, k, a, net as in chuteflow.trajectories.tables; B = y - b(L) the residual of the
-# base condition; ln Q = ln(S + G), S = F1 sqrt(T) P the flux at the slip velocity, G that by shear.
+# notation: P overburden, p normal stress, L, y, k, a, net as in chuteflow.trajectories.tables; B = y - b(L) the
+# residual of the base condition; ln Q = ln(S + G), S = F1 sqrt(T) P the flux at the slip velocity, G that by shear.
 
 Along a trajectory all derivatives are known; across, they are taken through the neighbours at the same depth.
 """
@@ -9,17 +9,17 @@ Along a trajectory all derivatives are known; across, they are taken through the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.tabulate import Array as Closures
+from chuteflow.numerics.compiled import compiled
 from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, LOSS, WORK
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.kernel import S_G, S_L, S_T, S_Y
 from chuteflow.trajectories.refining import TrajectoryGrid
-from chuteflow.trajectories.tables import tables
 
 Index = NDArray[np.int64]
 
@@ -29,6 +29,8 @@ _APART = 2.5
 _EVEN = 12.0
 #: Weights of a cubic whose sizes sum to more extrapolate.
 _SOUND = 3.0
+#: Zeros are near to each other within this share of the distances around.
+_NEAR = 0.3
 #: Surface temperatures of neighbours tell them apart if their logarithms differ by more.
 _TOLD = 1e-7
 
@@ -51,19 +53,25 @@ class Zeros:
         """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
         grid = self.grid
         zeros = grid.zeros[which]
-        rows = grid._rows(zeros[:, :2].astype(np.int64))
+        rows = grid.rows_of(zeros[:, :2].astype(np.int64))
         places = np.where(rows[:, 0] == rows[:, 1], zeros[:, 0] + zeros[:, 2], zeros[:, 1])
-        values = tables(grid.model).values
         return kernel.extremes_back(
-            values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
+            grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
         )
 
 
-def zeros_on(grid: TrajectoryGrid) -> Zeros:
-    """The zeros of B on ``grid``."""
+def extremes_on(grid: TrajectoryGrid) -> Array:
+    """Bounds of what trajectories have had down to each state, whatever their base, (N, 6), as in :class:`Zeros`."""
+    return kernel.extremes(
+        grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
+    )
+
+
+def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
+    """The zeros of B on ``grid``, given its ``extremes`` (N, 6)."""
     ends = grid.zeros[:, :2].astype(np.int64)
     share = grid.zeros[:, 2]
-    rows = grid._rows(ends)
+    rows = grid.rows_of(ends)
     across = rows[:, 0] == rows[:, 1]
     used, back = np.unique(ends, return_inverse=True)
     known = _Known.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
@@ -73,10 +81,8 @@ def zeros_on(grid: TrajectoryGrid) -> Zeros:
     step = known.log_m[two] - known.log_m[one]
     place = share.copy()
     down = ~across
-    place[down] = _hermite_zero(
-        *(v[down] for v in (known.excess[one], known.excess[two], known.excess_down[one] * step, known.excess_down[two] * step)),
-        share[down],
-    )
+    values = (known.excess[one], known.excess[two], known.excess_down[one] * step, known.excess_down[two] * step)
+    place[down] = _hermite_zero(*(of[down] for of in values), share[down])
     log_q = _hermite(
         known.log_q[one], known.log_q[two], known.flux_down[one] * step, known.flux_down[two] * step, place
     )
@@ -85,17 +91,14 @@ def zeros_on(grid: TrajectoryGrid) -> Zeros:
     # Through four neighbours at one depth.
     log_q[across], log_t[across], place[across] = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
 
-    mixed = lambda of: of[one] + share * (of[two] - of[one])  # noqa: E731
-    excess_down, excess_across = mixed(known.excess_down), mixed(known.excess_across)
-    flux_down, flux_across = mixed(known.flux_down), mixed(known.flux_across)
+    excess_down, excess_across, flux_down, flux_across = (
+        of[one] + share * (of[two] - of[one])
+        for of in (known.excess_down, known.excess_across, known.flux_down, known.flux_across)
+    )
     size = np.abs(excess_down) + np.abs(excess_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
     rise = (flux_across * excess_down - flux_down * excess_across) / size
-    every = kernel.extremes(
-        tables(grid.model).values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
-    )
-    low, high = every[ends[:, 0]], every[ends[:, 1]]
-    extremes = low + place[:, None] * (high - low)
-    return Zeros(grid, log_q, log_m, log_t, rise, extremes, 0.5 * np.abs(high - low)[:, :3])
+    low, high = extremes[ends[:, 0]], extremes[ends[:, 1]]
+    return Zeros(grid, log_q, log_m, log_t, rise, low + place[:, None] * (high - low), 0.5 * np.abs(high - low)[:, :3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,3 +270,26 @@ def _hermite_zero(one: Array, two: Array, slope_one: Array, slope_two: Array, t:
         span = f_high - f_low
         t = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
     return np.clip(t, 0.0, 1.0)
+
+
+@compiled
+def thinned(places: Array) -> Any:
+    """Which of successive ``places`` (k, 3) to keep, of those that lie much nearer to each other than others around:
+    the first and the last, and so many between that none is near the one before."""
+    count = len(places)
+    apart = np.empty(max(count - 1, 1))
+    for i in range(count - 1):
+        apart[i] = np.sqrt(np.sum((places[i + 1] - places[i]) ** 2))
+    kept = np.zeros(count, np.bool_)
+    kept[0] = True
+    last = 0
+    for i in range(1, count):
+        around = apart[max(i - 2, 0) : i + 2].mean()
+        near = np.sqrt(np.sum((places[i] - places[last]) ** 2)) < max(_NEAR * around, 1e-9)
+        if near and i < count - 1:
+            continue
+        if near and last > 0:
+            kept[last] = False
+        kept[i] = True
+        last = i
+    return kept

@@ -11,7 +11,6 @@ trajectory leaves, and in which B has one sign (:func:`chuteflow.trajectories.ke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -27,7 +26,7 @@ from chuteflow.steady.solver import default_stretch
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.kernel import S_G, S_H, S_L, S_T, START
 from chuteflow.trajectories.surface import surface_potential
-from chuteflow.trajectories.tables import BASE, Tables, served, tables
+from chuteflow.trajectories.tables import BASE, ENTRIES, Tables, base_table, bounds_for, tables
 
 Index = NDArray[np.int64]
 
@@ -60,8 +59,6 @@ REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
 _THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
-#: Surface temperatures whose logarithms are nearer are one.
-_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +86,8 @@ class TrajectoryGrid:
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
     curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
     row before, between two states where it was inserted; ``goes_on`` (N,) tells whether the curve goes on to the next
-    state. The trajectories serve every base between those that they were refined for, and heat fluxes are told apart
-    by their ``scale``: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3) are the two states between which B vanishes,
+    state. ``values`` (entries, 6) are the functions of L by which they go, and ``scale`` the size of heat fluxes. They
+    serve every base between those that they were refined for: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3) are the two states between which B vanishes,
     and the fraction of the way. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the
     first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or
     they are too long.
@@ -104,6 +101,7 @@ class TrajectoryGrid:
     came_from: Array
     goes_on: NDArray[np.bool_]
     first: Index
+    values: Array
     scale: float
     zeros: Array
     links: Index
@@ -114,7 +112,7 @@ class TrajectoryGrid:
     def of_base(self, problem: Model) -> TrajectoryGrid:
         """The same trajectories with the zeros of B for the base of ``problem``."""
         zeros, links = kernel.zeros_of(
-            tables(problem).values, BASE, self.states, self.came_from, self.goes_on, self.first
+            base_table(problem), 0, self.states, self.came_from, self.goes_on, self.first
         )
         return replace(self, model=problem, zeros=zeros, links=links)
 
@@ -125,7 +123,8 @@ class TrajectoryGrid:
             return float(self.overburden[-1])
         return float(self.overburden[max(int(np.searchsorted(self.first, len(self.states), side="left")) - 1, 0)])
 
-    def _rows(self, places: Index) -> Index:
+    def rows_of(self, places: Index) -> Index:
+        """The rows that states are in."""
         return np.searchsorted(self.first, places, side="right") - 1
 
     @cached_property
@@ -142,7 +141,7 @@ class TrajectoryGrid:
     def _quantities(self, places: Index) -> Array:
         """ln Q, ln h, ln M, ln T_surface of flows that had their base at states, (..., 4)."""
         model, state = self.model, self.states[places]
-        over = self.overburden[self._rows(places)]
+        over = self.overburden[self.rows_of(places)]
         f, _ = model.closures(np.exp(state[..., S_L]))
         root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
         flux = model.slip(f) * root_t * over + state[..., S_G]
@@ -169,7 +168,7 @@ class TrajectoryGrid:
         """The rough flow at a zero, on elements."""
         model = self.model
         one, other, fraction = int(self.zeros[zero, 0]), int(self.zeros[zero, 1]), float(self.zeros[zero, 2])
-        rows = self._rows(np.array([one, other]))
+        rows = self.rows_of(np.array([one, other]))
         place = one + fraction if rows[0] == rows[1] else float(other)
         back = kernel.trace_back(self.states, self.came_from, place, int(rows[1]))
         log_mass, log_t = self.macroscopic[zero, 2:]
@@ -198,29 +197,30 @@ def carry_down(
 ) -> TrajectoryGrid:
     """The grid of trajectories of ``model`` from surface temperatures ``coldest`` to ``hottest`` down to the hold-up
     ``deepest``. Those of the last few chutes are remembered: one asks for other flows of the same chute next."""
-    return carry_down_for((model,), coldest, hottest, deepest, (), refinement)
+    return carry_down_for(
+        model, np.empty((ENTRIES, 0)), starts(coldest, hottest, refinement), deepest, refinement=refinement
+    )
+
+
+def starts(coldest: float, hottest: float, refinement: Refinement = REFINEMENT) -> Array:
+    """The surface temperatures that trajectories start with, ascending."""
+    decades = np.log10(hottest / coldest)
+    return np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
 
 
 def carry_down_for(
-    models: Sequence[Model],
-    coldest: float,
-    hottest: float,
-    deepest: float,
-    asked: Sequence[float],
-    refinement: Refinement = REFINEMENT,
+    model: Model, others: Array, temperature: Array, deepest: float, refinement: Refinement = REFINEMENT
 ) -> TrajectoryGrid:
-    """The grid of trajectories that serves all ``models``, which differ by their base alone, and those with bases
-    between them; its zeros are of the first. Surface temperatures that are ``asked`` for have a trajectory of their
-    own."""
-    model, t = models[0], tables(models[0])
-    scale = max(one.flux_scale for one in models)
+    """The grid of trajectories from surface temperatures (C,), two or more, down to the hold-up ``deepest``, which
+    serves the base of ``model``, ``others`` (entries, K) by their heat fluxes, and all between these; its zeros are of
+    the first."""
+    t = tables(model)
+    bounds, scale = t.bounds, t.scale
+    if others.shape[1]:
+        bounds = bounds_for(model, np.concatenate([t.values[:, BASE, None], others], axis=1))
+        scale = max(scale, float(np.abs(others).max()))
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
-    overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
-    decades = np.log10(hottest / coldest)
-    temperature = np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
-    if asked:
-        temperature = _with_asked(temperature, asked)
-    bounds, others = served(models)
+    overburden = _depths(model, t, float(temperature[0]), deepest, p_1, refinement.step)
     states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
@@ -228,15 +228,9 @@ def carry_down_for(
     )  # fmt: skip
     zeros, links = kernel.zeros_of(t.values, BASE, states, came_from, goes_on, first)
     return TrajectoryGrid(
-        model, refinement, overburden, states, came_from, goes_on, first, scale, zeros, links, cells, undecided,
-        status == kernel.DONE,
+        model, refinement, overburden, states, came_from, goes_on, first, t.values, scale, zeros, links, cells,
+        undecided, status == kernel.DONE,
     )  # fmt: skip
-
-
-def _with_asked(temperature: Array, asked: Sequence[float]) -> Array:
-    """The temperatures, and those asked for in place of such as are as good as the same."""
-    apart = np.abs(np.log(temperature[:, None] / np.asarray(asked)[None, :])).min(axis=1)
-    return np.unique(np.concatenate([temperature[apart > _SAME], asked]))
 
 
 def _start_at_most(t: Tables) -> float:

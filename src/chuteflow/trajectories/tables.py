@@ -73,14 +73,23 @@ def tables(model: Model) -> Tables:
     return Tables(values, bounds, rate, model.flux_scale)
 
 
-def served(models: Sequence[Model]) -> tuple[Array, Array]:
-    """The bounds that hold for the bases of all ``models``, whose grains, slope and surface are the same, and the heat
-    fluxes (entries, models - 1) of all but the first."""
-    every = [tables(one) for one in models]
-    bounds = every[0].bounds
-    if len(every) > 1:
-        bounds = bounds.copy()
-        for column, extreme in ((BASE_LOW, np.min), (BASE_HIGH, np.max), (BASE_ABOVE, np.min)):
-            bounds[:, column] = extreme([t.bounds[:, column] for t in every], axis=0)
-    others = np.array([t.values[:, BASE] for t in every[1:]]).reshape(len(every) - 1, ENTRIES).T
-    return bounds, np.ascontiguousarray(others)
+def base_table(model: Model) -> Array:
+    """The heat flux that the base of ``model`` would give, (entries, 1)."""
+    return np.ascontiguousarray(model.base_flux(_closures(model.table))[:, None])
+
+
+def bounds_for(model: Model, bases: Array) -> Array:
+    """The bounds of the grains, slope and surface of ``model`` that hold for every base whose heat flux lies between
+    those of some, ``bases`` (entries, K)."""
+    bounds = tables(model).bounds.copy()
+    low, high = bases.min(axis=1), bases.max(axis=1)
+    bounds[:, BASE_LOW] = np.minimum.accumulate(low)
+    bounds[:, BASE_HIGH] = np.maximum.accumulate(high)
+    bounds[:, BASE_ABOVE] = np.minimum.accumulate(low[::-1])[::-1]
+    return bounds
+
+
+def envelope(models: Sequence[Model]) -> Array:
+    """The least and the largest heat flux that the bases of ``models`` with the same grains give, (entries, 2)."""
+    every = np.concatenate([base_table(one) for one in models], axis=1)
+    return np.stack([every.min(axis=1), every.max(axis=1)], axis=1)
