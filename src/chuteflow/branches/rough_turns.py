@@ -36,15 +36,21 @@ class Dip:
     zeros: tuple[float, ...]
 
 
-def dips(values: Array, at: Array) -> list[Dip]:
-    """The steps between the places ``at`` (k,) of a path in which ``values`` (k,) turn towards zero, and away again."""
+def dips(values: Array, at: Array, *, passing: bool = False) -> list[Dip]:
+    """The steps between the places ``at`` (k,) of a path in which ``values`` (k,) turn towards zero, and away again;
+    ``passing`` zero alone, or all."""
     if len(values) < 3:
         return []
     slope = np.gradient(values, at)
     length = np.diff(at)
     d0, d1 = slope[:-1] * length * np.sign(values[:-1]), slope[1:] * length * np.sign(values[:-1])
     out = []
-    for i in np.flatnonzero((values[1:] * values[:-1] > 0.0) & (d0 < 0.0) & (d1 > 0.0)).tolist():
+    turning_back = (values[1:] * values[:-1] > 0.0) & (d0 < 0.0) & (d1 > 0.0)
+    if passing:
+        # A cubic lies above its coefficients in Bernstein's form.
+        size = np.abs(values)
+        turning_back &= np.minimum(size[:-1] + d0 / 3.0, size[1:] - d1 / 3.0) < 0.0
+    for i in np.flatnonzero(turning_back).tolist():
         (f0, f1), sign = np.abs(values[i : i + 2]), np.sign(values[i])
         cubic = np.array([2.0 * (f0 - f1) + d0[i] + d1[i], 3.0 * (f1 - f0) - 2.0 * d0[i] - d1[i], d0[i], f0])
         turning, zeros = np.roots(np.polyder(cubic)).real, np.roots(cubic)

@@ -121,7 +121,7 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     """The steps in which ``rise`` changes sign, and the shares of them at which it does so; a step in which it passes
     zero twice, as just beyond a cusp, is there twice."""
     changes = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
-    pairs = [(dip.step, zero) for dip in dips(rise, at) if len(dip.zeros) == 2 for zero in dip.zeros]
+    pairs = [(dip.step, zero) for dip in dips(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros]
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
     shares = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]

@@ -228,12 +228,10 @@ def _bend(rows: Any, j: int, n: int, open_: Any, length: Any, q: int) -> tuple[f
 
 
 @compiled
-def _hides_zeros(
-    table: Any, base: int, rows: Any, before: float, last: float, j: int, n: int, open_: Any, length: Any
-) -> bool:
-    """Whether the residual of the base in a column of ``table``, ``before`` and ``last`` at the ends, may have zeros more between position j of the curve and the next than its signs there show:
+def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: Any, length: Any) -> bool:
+    """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
     where it does along the cubic through the two states, or comes half of the way to it."""
-    alike = (before >= 0.0) == (last >= 0.0)
+    before, last = residual[j], residual[j + 1]
     least = min(abs(before), abs(last))
     rise_l, rise_y = rows[j + 1, S_L] - rows[j, S_L], rows[j + 1, S_Y] - rows[j, S_Y]
     left_l, right_l = _bend(rows, j, n, open_, length, S_L)
@@ -244,12 +242,12 @@ def _hides_zeros(
         t = c / (_BETWEEN + 1.0)
         big_l = rows[j, S_L] + t * (rise_l + (1.0 - t) * ((1.0 - t) * left_l - t * right_l))
         y = rows[j, S_Y] + t * (rise_y + (1.0 - t) * ((1.0 - t) * left_y - t * right_y))
-        here = y - look_up(table, big_l, base)
+        here = y - look_up(values, big_l, BASE)
         changes += int((here >= 0.0) != (before >= 0.0))
         nearest = min(nearest, abs(here))
         before = here
     changes += int((last >= 0.0) != (before >= 0.0))
-    if alike:
+    if (residual[j] >= 0.0) == (last >= 0.0):
         return changes > 0 or nearest < 0.5 * least
     return changes > 1
 
@@ -267,10 +265,8 @@ def _grown(array: Any, size: int) -> Any:
 
 @compiled
 def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
-    """Join the ``count`` zeros on the boundary of a cell, in cyclic order, in pairs: of the two ways to join
+    """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to join
     neighbours the one with the shorter lines."""
-    if count < 2:
-        return
     even = odd = 0.0
     for c in range(count):
         d = c + 1 if c + 1 < count else 0
@@ -302,11 +298,8 @@ def carry(
     per_flux: float,
     finest: float,
     most: int,
-    others: Any,
 ) -> tuple[Any, ...]:
     """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending.
-
-    Trajectories are inserted for the base in ``values``, and for those in the columns of ``others`` (entries, K).
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
     where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row (R + 1,),
@@ -378,12 +371,7 @@ def carry(
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
                 limited = length[j] > 2.0 * delta * (wanted[j] + 1)
             elif not in_series[j]:
-                doubtful = _hides_zeros(values, BASE, rows, residual[j], residual[j + 1], j, n, open_, length)
-                for b in range(others.shape[1]):
-                    if not doubtful:
-                        before = rows[j, S_Y] - look_up(others, rows[j, S_L], b)
-                        last = rows[j + 1, S_Y] - look_up(others, rows[j + 1, S_L], b)
-                        doubtful = _hides_zeros(others, b, rows, before, last, j, n, open_, length)
+                doubtful = _hides_zeros(values, rows, residual, j, n, open_, length)
                 wanted[j] = 1 if doubtful and length[j] > finest else 0
                 limited = doubtful and length[j] <= finest
             if limited:
@@ -486,15 +474,17 @@ def carry(
 def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any) -> tuple[Any, Any]:
     """The zeros of B of the base in a column of ``table``: left or upper state, right or lower state, fraction
     between (Z, 3); and their neighbours along the zero set (Z, 2)."""
-    total = len(states)
-    residual = np.empty(total)
-    for i in range(total):
-        residual[i] = states[i, S_Y] - look_up(table, states[i, S_L], base)
+    widest = 1
+    for row in range(len(first) - 1):
+        widest = max(widest, first[row + 1] - first[row])
     zeros = np.empty((256, 3))
     links = np.full((256, 2), -1, np.int64)
     n_zeros = 0
-    edge = np.full(total, -1, np.int64)  # zero between a state and the next
-    side = np.full(total, -1, np.int64)  # zero of a trajectory since the row before
+    # Of this row, and of the row before: residual, and the zero between a state and the next.
+    residual, above_residual = np.empty(widest), np.empty(widest)
+    edge, above_edge = np.empty(widest, np.int64), np.empty(widest, np.int64)
+    side = np.empty(widest, np.int64)  # zero of a trajectory since the row before
+    above_begin = 0
     cell_nodes = np.empty(64, np.int64)
     cell_places = np.empty((64, 2))
     for row in range(len(first) - 1):
@@ -503,32 +493,34 @@ def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, f
         before = len(links)
         links = _grown(links, n_zeros + 2 * (end - begin))
         links[before:] = -1
-        for i in range(begin, end - 1):
-            if goes_on[i] and (residual[i] >= 0.0) != (residual[i + 1] >= 0.0):
-                zeros[n_zeros, 0] = i
-                zeros[n_zeros, 1] = i + 1
-                zeros[n_zeros, 2] = residual[i] / (residual[i] - residual[i + 1])
-                edge[i] = n_zeros
+        for j in range(end - begin):
+            residual[j] = states[begin + j, S_Y] - look_up(table, states[begin + j, S_L], base)
+            edge[j] = side[j] = -1
+        for j in range(end - begin - 1):
+            if (residual[j] >= 0.0) != (residual[j + 1] >= 0.0) and goes_on[begin + j]:
+                zeros[n_zeros, 0] = begin + j
+                zeros[n_zeros, 1] = begin + j + 1
+                zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
+                edge[j] = n_zeros
                 n_zeros += 1
-        if row == 0:
-            continue
-        for i in range(begin, end):
-            above = int(came_from[i])
-            if above == came_from[i] and (residual[above] >= 0.0) != (residual[i] >= 0.0):
+        for j in range(end - begin if row > 0 else 0):
+            above = int(came_from[begin + j])
+            was = above_residual[above - above_begin]
+            if (was >= 0.0) != (residual[j] >= 0.0) and above == came_from[begin + j]:
                 zeros[n_zeros, 0] = above
-                zeros[n_zeros, 1] = i
-                zeros[n_zeros, 2] = residual[above] / (residual[above] - residual[i])
-                side[i] = n_zeros
+                zeros[n_zeros, 1] = begin + j
+                zeros[n_zeros, 2] = was / (was - residual[j])
+                side[j] = n_zeros
                 n_zeros += 1
         # Lines through the cells between the rows.
-        left = begin
-        while left < end - 1:
+        left = 0 if row > 0 else end
+        while left < end - begin - 1:
             right = left + 1
-            while right < end and came_from[right] != int(came_from[right]):
+            while right < end - begin and came_from[begin + right] != int(came_from[begin + right]):
                 right += 1
-            if right < end and goes_on[left]:
+            if right < end - begin and goes_on[begin + left]:
                 count = 0
-                above = edge[int(came_from[left])]
+                above = above_edge[int(came_from[begin + left]) - above_begin]
                 if above >= 0:
                     cell_nodes[0] = above
                     cell_places[0, 0] = zeros[above, 2]
@@ -552,8 +544,12 @@ def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, f
                     cell_places[count, 0] = 0.0
                     cell_places[count, 1] = zeros[side[left], 2]
                     count += 1
-                _match(cell_nodes, cell_places, count, links)
+                if count > 1:
+                    _match(cell_nodes, cell_places, count, links)
             left = right
+        residual, above_residual = above_residual, residual
+        edge, above_edge = above_edge, edge
+        above_begin = begin
     return zeros[:n_zeros], links[:n_zeros]
 
 

@@ -224,7 +224,7 @@ def carry_down_for(
     states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
-        refinement.delta, 1.0 / scale, refinement.finest, refinement.most, others,
+        refinement.delta, 1.0 / scale, refinement.finest, refinement.most,
     )  # fmt: skip
     zeros, links = kernel.zeros_of(t.values, BASE, states, came_from, goes_on, first)
     return TrajectoryGrid(
