@@ -620,9 +620,7 @@ def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: A
 
 
 @compiled
-def extremes_back(
-    values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, rows: Any
-) -> Any:
+def extremes_back(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, rows: Any) -> Any:
     """The least and the largest net loss, and the largest p y/a, down to ``places`` (k,) in ``rows``, (k, 3)."""
     out = np.empty((len(places), 3))
     for k in range(len(places)):

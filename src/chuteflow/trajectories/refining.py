@@ -111,9 +111,7 @@ class TrajectoryGrid:
 
     def of_base(self, problem: Model) -> TrajectoryGrid:
         """The same trajectories with the zeros of B for the base of ``problem``."""
-        zeros, links = kernel.zeros_of(
-            base_table(problem), 0, self.states, self.came_from, self.goes_on, self.first
-        )
+        zeros, links = kernel.zeros_of(base_table(problem), 0, self.states, self.came_from, self.goes_on, self.first)
         return replace(self, model=problem, zeros=zeros, links=links)
 
     @property
