@@ -90,3 +90,10 @@ def test_solve_says_that_there_may_be_more():
     result = CliRunner().invoke(solve_command, [*options, "--roughness", str(DEEP.roughness), "--flux", "1e5"])
     assert result.exit_code == 0
     assert "there may be more: a branch goes on to hold-ups above 30, outside the range searched" in result.output
+
+
+def test_two_flows_beside_a_fold_are_found_where_the_first_and_last_rough_flows_lead_nowhere():
+    chute = Chute(0.40847170317075593, 0.7569944039450864, 0.6230513469256415, 0.8343213599270958, surface="interface")
+    pair = [f for f in flows(chute, Q=5084.14610269072) if 0.01 < f.surface_temperature < 0.1]
+    assert [f.mass_holdup for f in pair] == pytest.approx([22.63645003, 22.64098017], rel=1e-9)
+    assert [f.surface_temperature for f in pair] == pytest.approx([0.0485653639, 0.0443641143], rel=1e-8)

@@ -39,7 +39,9 @@ def test_solve_json(capsys):
         "slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun",
     }  # fmt: skip
     assert printed["reason"] is None
-    assert printed["searched"] == {"T_surface": [0.001, 100000.0], "M_max": 30.0}
+    searched = {name: printed["searched"][name] for name in ("T_surface", "M_max", "delta", "undecided")}
+    assert searched == {"T_surface": [0.001, 100000.0], "M_max": 30.0, "delta": 0.2, "undecided": 0}
+    assert printed["searched"]["cells"] > 1000
     keys = {"Q", "h", "M", "T_surface", "T_base", "nu_base", "nu_max", "u_base", "interior", "density", "error"}
     for flow, wanted in zip(printed["flows"], flows(CHUTE, Q=3.0), strict=True):
         assert keys <= set(flow)

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from chuteflow.branches.existence import imbalance
-from chuteflow.branches.families import TracedFamily, search, traced_families
+from chuteflow.branches.families import TracedFamily, doubt, search, searched, trace_all
 from chuteflow.branches.paths import Chord, Point, find_zero
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import Branch, Curve, Searched, SpecialPoint
+from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.branches.rough_turns import dips
 from chuteflow.checks import whole
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
@@ -66,7 +66,8 @@ def curve(
     tolerance = checked_tolerance(tolerance)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
-    found = traced_families(problem, within, tolerance)
+    found, lost = trace_all(problem, within, tolerance)
+    grid = search(problem, within)
     longest = max((float(family.arclength[-1]) for family in found), default=1.0)
     branches = [
         _branch(chute, family, _samples(family, points, float(family.arclength[-1]) / longest), tolerance)
@@ -76,9 +77,10 @@ def curve(
     return Curve(
         chute=chute,
         branches=tuple(branches),
-        searched=Searched((within.coldest, within.hottest), min(within.deepest, search(problem, within).deepest)),
+        searched=searched(within, grid),
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
+        incomplete=doubt(grid, within, lost, "a family"),
     )
 
 
@@ -115,7 +117,7 @@ def _folds(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tup
 def _changes(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which the density turns inverted, or the interior another kind, with their arclengths."""
     points, at = family.points, family.arclength
-    rough = np.array([rough_kinds(point.solution) for point in points])
+    rough = rough_kinds([point.solution for point in points])
     for column, (kind, quantity) in enumerate(_CHANGES):
         # What is near to zero is told by the flow itself.
         values = rough[:, column].copy()

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
-from chuteflow.branches.families import Family, crossings, families, search
+from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import FlowSet, Searched
+from chuteflow.branches.results import FlowSet
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -25,6 +25,7 @@ from chuteflow.steady.flow import flows_of
 from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 from chuteflow.threads import on_one_thread
+from chuteflow.trajectories.refining import TrajectoryGrid
 
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
@@ -77,13 +78,13 @@ def flows(
     found = _search(problem, which, value, tolerance, within)
     for _ in range(_EXTENSIONS):
         wider = _wider(found, which, value)
-        if wider == found.within or found.carried < found.within.deepest * (1.0 - 1e-9):
+        if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
             break
         found = _search(problem, which, value, tolerance, wider)
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
-        searched=Searched((found.within.coldest, found.within.hottest), min(found.within.deepest, found.carried)),
+        searched=searched(found.within, found.grid),
         tolerance=tolerance,
         reason=None
         if found.solutions
@@ -95,15 +96,14 @@ def flows(
 @dataclass(frozen=True, eq=False)
 class _Search:
     """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
-    rough quantities of flows that were seen and not solved, and the hold-up down to which the search was
-    ``carried``."""
+    rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
 
     within: Range
     families: tuple[Family, ...]
     solutions: list[Solution]
     beyond: list[Solution]
     lost: list[Array]
-    carried: float
+    grid: TrajectoryGrid
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
@@ -116,7 +116,7 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
         lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _Search(within, found, inside, beyond, lost, search(problem, within).deepest)
+    return _Search(within, found, inside, beyond, lost, search(problem, within))
 
 
 def _asked(given: dict[str, float | None]) -> tuple[int, float]:
@@ -154,14 +154,10 @@ def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
 
 
 def _left_out(found: _Search, which: int, value: float) -> str | None:
-    """What the search leaves open, in words: flows not solved, depths not reached, branches not followed to where they
-    may have the value."""
-    if found.lost:
-        mass, temperature = np.exp(found.lost[0][LOG_M:])
-        many = f"{len(found.lost)} flows were" if len(found.lost) > 1 else "a flow was"
-        return f"{many} seen and not solved, near M = {mass:.4g} and T_surface = {temperature:.4g}"
-    if found.carried < found.within.deepest * (1.0 - 1e-9):
-        return f"beyond a hold-up of {found.carried:.4g} there are too many flows to search"
+    """What the search leaves open, in words: also branches not followed to where they may have the value."""
+    left = doubt(found.grid, found.within, found.lost, "a flow", which, value)
+    if left is not None:
+        return left
     for lead in _leads(found, which, value):
         if lead.axis == LOG_M:
             there = f"hold-ups above {found.within.deepest:g}"

@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.paths import Chord, Point, Turn, find_value, point_at, refined, turns
 from chuteflow.branches.ranges import CLOSED, Range
+from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
 
+#: Where a first or last rough flow leads nowhere, those so many places further are tried.
+_OTHERS = (0, 1, 2, 4, 8, 16)
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
-_TOO_NEAR, _SPACING, _TURNED = 0.015, 0.12, 0.95
+_TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
 #: Reaches over which the direction of a rough branch is looked for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
@@ -33,13 +37,18 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 #: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
-#: One flow is solved at once where the quantity changes by more than this along the branch, per length.
-_STEEP = 0.15
+#: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
+#: least the second; and there by more than so many times of what the rough flow was wrong by.
+_STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
+#: Where the flows among rough ones are not found, they are looked for between rough ones so much further away.
+_FURTHER = 0.1
 #: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
 #: where it changes by more than the second along the branch, per length.
 _NEARLY, _FIXES = 0.01, 1e-3
 #: A rough end is at an edge of the range if it is as near to it in the logarithm.
 _AT_EDGE = 1e-6
+#: An undecided cell may hide a flow with a value that is as near to its own, in the logarithm.
+_HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
 #: Why a branch ends where it is lost.
@@ -106,35 +115,58 @@ class Family:
             return None
         return point
 
-    def _solved_from(self, begin: int, end: int, tolerance: float) -> list[Point]:
+    def _solved_near(self, places: list[int], tolerance: float) -> list[Point]:
+        """The flows at some rough ones in order, without those that lead nowhere."""
         found: list[Point] = []
-        for i in self._spaced(begin, end):
+        for i in places:
             # Where one rough flow leads nowhere its neighbour may.
-            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if begin <= k <= end)
+            tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if 0 <= k < len(self.macroscopic))
             point = next((point for point in tries if point is not None), None)
             if point is not None and not (found and _is_behind(point, found[-1])):
                 found.append(point)
         return found
 
-    def points(self, begin: int, end: int, tolerance: float) -> list[Point]:
-        """Points from rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
+    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
+        """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
+        them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
+        it.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
-        found = self._solved_from(begin, end, tolerance)
-        if not found:
-            raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
-        return refined(found, tolerance)
+
+        def agrees(i: int) -> Point | None:
+            point = self.solved(i, tolerance)
+            off = self.macroscopic[i, which] - target
+            return point if point is not None and (point.m[which] >= target) == (off >= 0.0) else None
+
+        def outermost(places: list[int]) -> tuple[int, Point]:
+            found = next(((i, point) for i in places if (point := agrees(i)) is not None), None)
+            if found is None:
+                raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
+            return found
+
+        # Outwards, and from an end of the branch inwards.
+        whole, middle = len(self.macroscopic) - 1, (begin + end) // 2
+        sign = -1 if begin > 0 else 1
+        begin, first = outermost([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle])
+        sign = 1 if end < whole else -1
+        end, last = outermost([i for k in _OTHERS if middle < (i := end + sign * k) <= whole])
+        inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
+        while inner and _is_behind(last, inner[-1]):
+            inner.pop()
+        return refined([first, *inner, last], tolerance)
 
     def traced(self, tolerance: float) -> list[TracedFamily]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
         if len(inside) < 2:
             return []
-        found = self._solved_from(int(inside[0]), int(inside[-1]), tolerance)
-        if self.rough.closed and found:
-            found.append(found[0])
+        found = self._solved_near(self._spaced(int(inside[0]), int(inside[-1])), tolerance)
+        if self.rough.closed and len(inside) == len(self.macroscopic) and found:
+            while len(found) > 1 and _is_behind(found[0], found[-1]):
+                found.pop()
+            found = [*found, found[0]] if len(found) > 2 else []
         pieces: list[list[Point]] = [found[:1]]
         for one, other in pairwise(found):
             try:
@@ -142,7 +174,7 @@ class Family:
             except SolveError:
                 pieces.append([other])
         ends = [LOST] * (2 * len(pieces))
-        if self.rough.closed and len(pieces) == 1:
+        if len(found) > 1 and len(pieces) == 1 and found[0] is found[-1]:
             ends = [CLOSED, CLOSED]
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
@@ -155,13 +187,16 @@ class Family:
     def _spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
         length = self.arclength
+        least, most = _TOO_NEAR, _SPACING
+        if self.rough.closed:
+            least, most = min(least, length[-1] / 16.0), min(most, length[-1] / 8.0)
         kept, ahead = [begin], self._direction(begin)
         for i in range(begin + 1, end):
             step = length[i] - length[kept[-1]]
-            if step < _TOO_NEAR:
+            if step < least:
                 continue
             here = self._direction(i)
-            if here is not None and (step > _SPACING or ahead is None or float(here @ ahead) < _TURNED):
+            if here is not None and (step > most or ahead is None or float(here @ ahead) < _TURNED):
                 kept.append(i)
                 ahead = here
         return [*kept, end] if end > begin else kept
@@ -176,6 +211,33 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
 def search(model: Model, within: Range) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
     return carry_down(model, within.coldest, within.hottest, within.deepest)
+
+
+def searched(within: Range, grid: TrajectoryGrid) -> Searched:
+    """The range searched, and the cells that the search looked at."""
+    cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
+    return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
+
+
+def doubt(
+    grid: TrajectoryGrid, within: Range, lost: list[Array], what: str, which: int = 0, value: float | None = None
+) -> str | None:
+    """What the search leaves open in the range, in words: flows seen and not solved, with the rough quantities
+    ``lost``, depths not reached, cells that may hide flows, where a value is given only those near it."""
+    if lost:
+        many = f"{len(lost)} {'families' if what == 'a family' else 'flows'} were" if len(lost) > 1 else f"{what} was"
+        return f"{many} seen and not solved, near {_place(lost[0])}"
+    if grid.deepest < within.deepest * (1.0 - 1e-9):
+        return f"beyond a hold-up of {grid.deepest:.4g} there are too many flows to search"
+    hidden = [m for m in grid.hidden if within.contains(m) and np.isfinite(m).all()]
+    if value is not None:
+        hidden = [m for m in hidden if abs(m[which] - np.log(value)) < _HIDDEN]
+    return f"the search does not tell flows apart near {_place(hidden[0])}" if hidden else None
+
+
+def _place(macroscopic: Array) -> str:
+    mass, temperature = np.exp(macroscopic[LOG_M:])
+    return f"M = {mass:.4g} and T_surface = {temperature:.4g}"
 
 
 def crossings(
@@ -195,14 +257,12 @@ def crossings(
     found: list[Solution] = []
     lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
-        single = _single(family, which, target, off, begin, end, tolerance)
-        if single is not None:
-            found.append(single)
-            continue
-        try:
-            found += _among(family, which, target, begin, end, tolerance)
-        except SolveError:
+        single = _solve_single(family, which, target, off, begin, end, tolerance)
+        solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
+        if solved is None:
             lost += [m[i] for i in changes.tolist() if begin <= i < end]
+        else:
+            found += solved
     return found, lost
 
 
@@ -231,34 +291,57 @@ def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
     return runs
 
 
-def _single(
+def _solve_single(
     family: Family, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
 ) -> Solution | None:
     """The one flow among rough flows along which the quantity rises or falls steeply; None where it may turn."""
-    steps, lengths = np.diff(off[begin : end + 1]), np.diff(family.arclength[begin : end + 1])
-    steep = np.abs(steps) > _STEEP * lengths
-    if not steep.all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        return None
     change = np.flatnonzero((off[begin:end] >= 0.0) != (off[begin + 1 : end + 1] >= 0.0))
-    if len(change) != 1:
+    slopes = _slopes(off, family.arclength, begin, end)
+    if len(change) != 1 or not (np.abs(slopes) > _STEEP).all() or not ((slopes > 0.0).all() or (slopes < 0.0).all()):
         return None
     i = begin + int(change[0])
     nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
     weights = np.zeros(4)
     weights[which] = 1.0
     point = point_at(family.rough.start(nearer), weights, target, tolerance)
-    if point is None or abs(point.tangent[which]) < 0.5 * _STEEP:
+    if point is None or abs(point.tangent[which]) < 0.5 * np.abs(slopes).min():
         return None
     fraction = off[i] / (off[i] - off[i + 1])
     there = family.macroscopic[i] + fraction * (family.macroscopic[i + 1] - family.macroscopic[i])
     spacing = family.arclength[i + 1] - family.arclength[i]
-    return point.solution if np.linalg.norm(point.m - there) < _ROUGH + _ASTRAY * spacing else None
+    wrong = float(np.linalg.norm(point.m - there))
+    sure = wrong < _ROUGH + _ASTRAY * spacing and np.abs(slopes).min() * max(_OVER, spacing) > _SURELY * abs(
+        float((point.m - there)[which] - point.tangent[which] * ((point.m - there) @ point.tangent))
+    )
+    return point.solution if sure else None
 
 
-def _among(family: Family, which: int, target: float, begin: int, end: int, tolerance: float) -> list[Solution]:
+def _slopes(off: Array, arclength: Array, begin: int, end: int) -> Array:
+    """Of a quantity along the branch at places from ``begin`` to ``end``, between neighbours that are not too near."""
+    places = np.arange(begin, end + 1)
+    before = np.maximum(np.searchsorted(arclength, arclength[places] - 0.5 * _OVER, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(arclength, arclength[places] + 0.5 * _OVER), len(off) - 1)
+    return (off[after] - off[before]) / np.maximum(arclength[after] - arclength[before], 1e-300)
+
+
+def _solve_among(
+    family: Family, which: int, target: float, begin: int, end: int, tolerance: float
+) -> list[Solution] | None:
     """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
-    pieces."""
-    points = family.points(begin, end, tolerance)
+    pieces. None where they are not found."""
+    length = family.arclength
+    for _ in range(2):
+        try:
+            points = family.points(begin, end, which, target, tolerance)
+            return _on_path(points, which, target, tolerance)
+        except SolveError:
+            begin = max(int(np.searchsorted(length, length[begin] - _FURTHER)) - 1, 0)
+            end = min(int(np.searchsorted(length, length[end] + _FURTHER)), len(length) - 1)
+    return None
+
+
+def _on_path(points: list[Point], which: int, target: float, tolerance: float) -> list[Solution]:
+    """The flows on a path of solved points at which a quantity takes a value."""
     placed = [(float(i), point) for i, point in enumerate(points)]
     turning = turns(points, which, tolerance)
     placed += [(turn.place, turn.point) for turn in turning]
@@ -268,9 +351,6 @@ def _among(family: Family, which: int, target: float, begin: int, end: int, tole
         ends = float(one.m[which]) - target, float(other.m[which]) - target
         if (ends[0] >= 0.0) != (ends[1] >= 0.0):
             found.append(_between(Chord(one, other, tolerance), which, target))
-    seen = family.macroscopic[[begin, end], which] - target
-    if len(found) % 2 != ((seen[0] >= 0.0) != (seen[1] >= 0.0)) and not turning:
-        raise SolveError("a flow seen in the search was not found on its branch")
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution
@@ -347,4 +427,17 @@ class TracedFamily:
 
 def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
     """Every branch of flows in the range, solved from end to end."""
-    return [piece for family in families(model, within) for piece in family.traced(tolerance)]
+    return trace_all(model, within, tolerance)[0]
+
+
+def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
+    """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
+    found: list[TracedFamily] = []
+    lost: list[Array] = []
+    for family in families(model, within):
+        pieces = family.traced(tolerance)
+        found += pieces
+        inside = [m for m in family.macroscopic if within.contains(m)]
+        if len(inside) > 1 and not pieces:
+            lost.append(inside[len(inside) // 2])
+    return found, lost

@@ -17,11 +17,23 @@ from chuteflow.steady.quantities import NUMBERS, PLACE
 
 
 @dataclass(frozen=True)
+class Cells:
+    """What the grid of trajectories looked at: neighbours are at most ``delta`` apart; of ``number`` cells between them
+    so many are ``undecided``: they may hide flows."""
+
+    delta: float
+    number: int
+    undecided: int
+
+
+@dataclass(frozen=True)
 class Searched:
-    """The range searched: surface temperatures (low, high) and largest hold-up."""
+    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` looked at, where they
+    were counted."""
 
     surface_temperature: tuple[float, float]
     largest_holdup: float
+    cells: Cells | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +41,9 @@ class FlowSet(Sequence[Flow]):
     """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
-    ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where a branch
-    leaves the range searched towards what was asked for, so that there may be more, and None where none does.
+    ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where there
+    may be more: where a branch leaves the range searched towards what was asked for, a flow that was seen could not be
+    solved, or the search does not tell; None otherwise.
     """
 
     chute: Chute
@@ -133,13 +146,15 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """All families of flows of one chute, in the range searched; ``reason`` where there is none."""
+    """All families of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
+    where there may be more: where a family was seen and not solved, or the search does not tell."""
 
     chute: Chute
     branches: tuple[Branch, ...]
     searched: Searched
     tolerance: float
     reason: str | None
+    incomplete: str | None = None
 
     def __repr__(self) -> str:
         families = display.counted(len(self.branches), "family", "families")

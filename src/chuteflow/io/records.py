@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from chuteflow.branches.lines import in_order
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import KINDS, Branch, Curve, FlowSet, Searched, SpecialPoint
+from chuteflow.branches.results import KINDS, Branch, Cells, Curve, FlowSet, Searched, SpecialPoint
 from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS, chute_object, finite
@@ -81,11 +81,11 @@ def head(result: Result, found: Sequence[Row]) -> dict[str, Any]:
             "searched": {
                 "surface_temperature": list(result.searched.surface_temperature),
                 "largest_holdup": result.searched.largest_holdup,
+                **({} if result.searched.cells is None else {"cells": asdict(result.searched.cells)}),
             },
             "tolerance": result.tolerance,
             "reason": result.reason,
         }
-    if isinstance(result, FlowSet):
         kept["incomplete"] = result.incomplete
     if isinstance(result, Curve):
         kept["ends"] = [list(branch.ends) for branch in result.branches]
@@ -227,21 +227,31 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
             raise InputError(f"it holds {len(found)} flows in the place of one")
         return found[0].flow
     within = Range.checked(kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface)
-    searched = Searched((within.coldest, within.hottest), within.deepest)
+    searched = Searched((within.coldest, within.hottest), within.deepest, _cells(kept["searched"]))
     tolerance, reason = checked_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
+    incomplete = _sentence("incomplete", kept.get("incomplete"))
     if kind == "flows":
         flows = tuple(row.flow for row in found)
         for one, two in pairwise(flows):
             if one.surface_temperature < two.surface_temperature or _same(one, two):
                 raise InputError("its flows are not from hot to cold, each once")
-        return FlowSet(chute, flows, searched, tolerance, reason, _sentence("incomplete", kept.get("incomplete")))
+        return FlowSet(chute, flows, searched, tolerance, reason, incomplete)
     if kind != "curve":
         raise InputError(f"it holds an unknown kind of result, {shown(kind)}")
     ends = [(str(begin), str(end)) for begin, end in kept["ends"]]
     if any(row.branch >= len(ends) for row in found):
         raise InputError("it holds flows of a branch that is not in it")
     branches = [_branch([row for row in found if row.branch == i], at) for i, at in enumerate(ends)]
-    return Curve(chute, tuple(branches), searched, tolerance, reason)
+    return Curve(chute, tuple(branches), searched, tolerance, reason, incomplete)
+
+
+def _cells(kept: Mapping[str, Any]) -> Cells | None:
+    cells = kept.get("cells")
+    if cells is None:
+        return None
+    delta = number("delta", cells["delta"], 1e-6, 1e6)
+    counts = [whole(name, cells[name], 0, 10**12) for name in ("number", "undecided")]
+    return Cells(delta, *counts)
 
 
 def _sentence(name: str, value: Any) -> str | None:

@@ -103,6 +103,8 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
         yield words.multiplicity(found, scales)
     else:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
+    if found.incomplete:
+        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
     yield words.searched(found.searched, found.chute, scales)
 
 
