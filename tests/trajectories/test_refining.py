@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from chuteflow.branches.families import doubt
-from chuteflow.branches.ranges import Range
 from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
+from chuteflow.branches.families import doubt
+from chuteflow.branches.ranges import Range
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.refining import REFINEMENT, carry_down

@@ -77,7 +77,7 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
             singly += 1
             _fill_singly(study, out, int(members[lane]), failures)
         _fill_reasons(out, batch, members)
-    return Chunk(**{**vars(out), "failures": {first + i: why for i, why in sorted(failures.items())}, "singly": singly})
+    return replace(out, failures={first + i: why for i, why in sorted(failures.items())}, singly=singly)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
