@@ -21,6 +21,7 @@ from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.steady.kinds import DENSITIES, DISSIPATIVE, MIXED, PRODUCTIVE
 from chuteflow.steady.solver import Solution
 
 #: The argument of :func:`chuteflow.flows` that holds the quantity which folds.
@@ -92,9 +93,9 @@ def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     point: BoundaryPoint = boundary.traced.points[index]
     condition = point.system.condition
     if isinstance(condition, Inversion):
-        kinds = ("monotonic", "inverted")
+        kinds = DENSITIES
     elif isinstance(condition, InteriorChange):
-        kinds = ("productive", "mixed") if condition.largest else ("mixed", "dissipative")
+        kinds = (PRODUCTIVE, MIXED) if condition.largest else (MIXED, DISSIPATIVE)
     else:
         return None
     at = point.system.local(point.w)

@@ -15,6 +15,7 @@ from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
+from chuteflow.steady.kinds import density_kind, interior_kind
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.names import name_of
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
@@ -197,15 +198,12 @@ class Flow:
         """ "dissipative" or "productive" throughout, or "mixed"."""
         net = self._samples["net"]
         # Net loss within rounding of zero decides nothing.
-        scale = 1e-12 * np.abs(net).max()
-        if net.min() >= -scale:
-            return "dissipative"
-        return "productive" if net.max() <= scale else "mixed"
+        return interior_kind(net.min(), net.max(), 1e-12 * np.abs(net).max())
 
     @property
     def density(self) -> str:
         """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
-        return "inverted" if self.density_excess > 0.0 else "monotonic"
+        return density_kind(self.density_excess)
 
     @cached_property
     def density_excess(self) -> float:

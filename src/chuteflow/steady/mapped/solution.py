@@ -53,6 +53,7 @@ from chuteflow.numerics.newton import newton
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, Profile
+from chuteflow.steady.kinds import density_kind
 from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
@@ -479,7 +480,7 @@ class MappedSolution:
     @cached_property
     def density(self) -> str:
         """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
-        return "inverted" if self.system.density_excess(self.z) > 0.0 else "monotonic"
+        return density_kind(self.system.density_excess(self.z))
 
     @property
     def map_length(self) -> float:
