@@ -12,7 +12,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.steady.flow import CUTOFF
 from chuteflow.sweeps.bases import Flows
-from chuteflow.sweeps.batch import FLUX, HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
+from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, Along, Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
 
@@ -95,9 +95,10 @@ class Inside:
 
     @property
     def repeated(self) -> NDArray[np.bool_]:
-        """Which flows come to the same base when they are followed once more."""
+        """Which flows are the same at the base, with what was integrated on the way, when they are followed once more."""
         off = np.abs(self._at_base - self._flows.state)
-        return (off[LOG_X] < _SAME) & (off[FLUX] < _SAME)
+        integrals = off[[MOMENT, GLIDE]] / np.abs(self._flows.state[[MOMENT, GLIDE]])
+        return (off[[LOG_X, FLUX]] < _SAME).all(axis=0) & (integrals < _SAME).all(axis=0)
 
     @property
     def inverted(self) -> Array:
