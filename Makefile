@@ -7,12 +7,13 @@
 .DEFAULT_GOAL := help
 
 # The first interpreter that runs and is new enough. Another one: make PYTHON=/path/to/python3 ...
-PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
+PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
 WORKERS ?= 2
 
 VENV := .venv
-BIN := $(VENV)/bin
+# Where an environment has its programs; the variable is set on Windows alone.
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 INSTALL := $(PIP) install --quiet --progress-bar off
 

@@ -94,10 +94,10 @@ class Inside:
 
     @property
     def repeated(self) -> NDArray[np.bool_]:
-        """Which flows are the same at the base, with what was integrated on the way, when they are followed once more."""
+        """Which flows come to the same state at the base, integrals included, when they are followed once more."""
         off = np.abs(self._at_base - self._flows.state)
         integrals = off[[MOMENT, GLIDE]] / np.abs(self._flows.state[[MOMENT, GLIDE]])
-        return (off[[LOG_X, FLUX]] < _SAME).all(axis=0) & (integrals < _SAME).all(axis=0)
+        return np.asarray((np.concatenate([off[[LOG_X, FLUX]], integrals]) < _SAME).all(axis=0))
 
     @property
     def inverted(self) -> Array:
