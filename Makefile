@@ -1,6 +1,6 @@
 # Everything is installed into .venv, at the versions of constraints.txt; Python 3.11 or later, pip and make
 # are enough. Stamp files remember what is done: after a change in src/ or pyproject.toml only the wheel is
-# built and installed anew, after a change in constraints.txt the packages follow.
+# built and installed again, after a change in constraints.txt the packages follow.
 
 .SHELLFLAGS := -ec
 .DELETE_ON_ERROR:

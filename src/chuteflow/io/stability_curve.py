@@ -58,9 +58,9 @@ def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
 
 def change_words(change: Change, chute: Chute, scales: Scales | None) -> str:
     """Where stability changes, and how well that is known."""
-    warmth = factor("surface_temperature", chute, scales)
+    scale = factor("surface_temperature", chute, scales)
     what = "neutral" if change.neutral else "the verdict changes"
-    T, error = change.flow.surface_temperature * warmth, change.error * warmth
+    T, error = change.flow.surface_temperature * scale, change.error * scale
     return f"{what} at T_surface = {T:.6g} +- {error:.1g}"
 
 
@@ -70,6 +70,6 @@ def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
 
 def stretch(run: Run, chute: Chute, scales: Scales | None) -> str:
     """A stretch of a curve in words, by its surface temperatures."""
-    warmth = factor("surface_temperature", chute, scales)
-    ends = (number(flow.surface_temperature * warmth) for flow in (run.flows[0], run.flows[-1]))
+    scale = factor("surface_temperature", chute, scales)
+    ends = (number(flow.surface_temperature * scale) for flow in (run.flows[0], run.flows[-1]))
     return f"{LABELS[run.label]} from T_surface = {' to '.join(ends)}"
