@@ -164,7 +164,7 @@ class Elements:
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
         errors = np.zeros((2 if rounding else 0, 4))
         mu, step = kernel.iterate(
-            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
             ends, slopes, self.log_mass, weights, value, tolerance, most, quantities, rates,
             errors,
         )  # fmt: skip
@@ -177,7 +177,7 @@ class Elements:
         (4,), change by 1; None where the condition turns."""
         change = np.empty(4)
         found = kernel.direction(
-            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
             self.ends, self.slopes, self.log_mass, weights, change,
         )  # fmt: skip
         return change if found else None

@@ -28,18 +28,28 @@ _LONGEST, _HALVINGS = 2.0, 8
 
 @compiled
 def closures(table: Any, x: float, f: Any) -> None:
-    """The closures at x and their derivatives with respect to ln x, into ``f`` (16,)."""
-    degree, pieces, width = table.shape
+    """The closures at x and their derivatives with respect to ln x, into ``f`` (16,).
+
+    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.Table`.
+    """
+    coefficients, edges = table
+    degree, pieces, width = coefficients.shape
     inner = math.log1p(x / OFFSET)
     c = math.log1p(inner)
     position = min(max(c, 0.0), UPPER) * (pieces / UPPER)
     i = min(int(position), pieces - 1)
     t = 2.0 * (position - i) - 1.0
+    if len(edges) > 0:
+        while position < edges[i]:
+            i -= 1
+        while position >= edges[i + 1] and i + 1 < pieces:
+            i += 1
+        t = 2.0 * (position - edges[i]) / (edges[i + 1] - edges[i]) - 1.0
     for q in range(width):
-        f[q] = table[degree - 1, i, q]
+        f[q] = coefficients[degree - 1, i, q]
     for d in range(degree - 2, -1, -1):
         for q in range(width):
-            f[q] = f[q] * t + table[d, i, q]
+            f[q] = f[q] * t + coefficients[d, i, q]
     by_log = x / ((x + OFFSET) * (1.0 + inner))
     for q in range(width // 2, width):
         f[q] *= by_log

@@ -14,6 +14,7 @@ on p_S <= p <= p_S + M is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -61,7 +62,11 @@ def closure_table(closure: Law, e: float, slope: float) -> Table:
 # Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
 def _closure_table(chosen: Law, e: float, slope: float) -> Table:
-    density = _density_table(chosen, e, slope)
+    breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
+    scaled_breaks = np.array([nu / (1.0 - nu / chosen.densest) for nu in breaks])
+    density = _density_table(chosen, e, slope, _coordinate(scaled_breaks).tolist())
+    (log_ratio, _), _ = density(_coordinate(scaled_breaks))
+    breaks_of_x = _coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
 
     def functions(c: Array) -> Array:
         x = _argument(c)
@@ -74,7 +79,7 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         k = r.coupling * nu / (r.stiffness + r.coupling * nu)
         return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
 
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
 
 def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
@@ -84,8 +89,9 @@ def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float) -> Table:
-    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*)."""
+def _density_table(chosen: Law, e: float, slope: float, breaks: Sequence[float]) -> Table:
+    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
+    ``breaks`` are places where the law is not smooth."""
 
     def gamma_slope(c: Array) -> Array:
         scaled = _argument(c)
@@ -93,7 +99,7 @@ def _density_table(chosen: Law, e: float, slope: float) -> Table:
         rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
         return rate[:, None] * ((scaled + OFFSET) * (1.0 + np.log1p(scaled / OFFSET)))[:, None]
 
-    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE))
+    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE, breaks))
 
     def functions(c: Array) -> Array:
         scaled = _argument(c)
@@ -102,7 +108,7 @@ def _density_table(chosen: Law, e: float, slope: float) -> Table:
         log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
         return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
 
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
 
 
 def _invert(density: Table, x: Array) -> Array:
@@ -152,6 +158,11 @@ class Model:
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
         return self.slope * self.slip(closures) - self.base_loss
+
+    @cached_property
+    def kinks(self) -> Array:
+        """ln x at which the closures are not smooth, ascending."""
+        return np.log(_argument(np.array(self.table.breaks)))
 
     @cached_property
     def flux_scale(self) -> float:

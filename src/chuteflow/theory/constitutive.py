@@ -18,8 +18,8 @@ theta is uniform wherever there is no heat flux, however the density varies.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +57,12 @@ class Law:
     """A constitutive law.
 
     ``coefficients(nu, room, e, slope)`` takes nu and ``room`` = 1 - nu/nu* apart, so that no digit is lost
-    near the densest packing nu* = ``densest``, where the radial distribution function diverges.
+    near the densest packing nu* = ``densest``, where the radial distribution function diverges. It is a plain
+    function, or a frozen dataclass whose fields are the parameters of the law, see
+    :class:`chuteflow.theory.formula.Formula`: laws with equal values of them are equal.
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
-    is a function of nu and the slope.
+    is a function of nu and the slope. ``breaks`` are the volume fractions at which a coefficient is not smooth, or
+    a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words.
     """
 
     name: str
@@ -68,6 +71,59 @@ class Law:
     densest: float
     coefficients: Callable[[Field, Field, float, float], Coefficients]
     knows_slope: bool = False
+    breaks: tuple[float, ...] | Callable[[float, float], tuple[float, ...]] = ()
+    valid: str = ""
+
+    @classmethod
+    def of(cls, name: str, description: str, source: str, formula: Any, valid: str = "") -> Law:
+        """The law of a ``formula``, a dataclass of parameters that also has ``densest`` and ``breaks``."""
+        knows_slope = hasattr(formula, "at_shear")
+        return cls(name, description, source, formula.densest, formula, knows_slope, formula.breaks, valid)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters by name; none where the law is a plain function."""
+        formula: Any = self.coefficients
+        return {field.name: getattr(formula, field.name) for field in fields(formula)} if is_dataclass(formula) else {}
+
+    def configured(self, **settings: Any) -> Law:
+        """The law with other values of some of its parameters.
+
+        Raises:
+            InputError: for a parameter that it does not have, or a value out of range.
+        """
+        for name in settings:
+            if name not in self.parameters:
+                known = ", ".join(self.parameters) or "it has none"
+                raise InputError(f"closure {self.name!r} has no parameter {name!r}: choose from {known}")
+        if not settings:
+            return self
+        formula: Any = replace(cast(Any, self.coefficients), **settings)
+        return Law.of(self.name, self.description, self.source, formula, self.valid)
+
+    def breaks_at(self, e: float, slope: float) -> tuple[float, ...]:
+        """The volume fractions, ascending, at which a coefficient is not smooth at this restitution and slope.
+
+        Raises:
+            InputError: for one that is not between 0 and the densest packing.
+        """
+        places = self.breaks(e, slope) if callable(self.breaks) else self.breaks
+        for nu in places:
+            if not 0.0 < nu < self.densest:
+                raise InputError(
+                    f"closure {self.name!r} has a break at nu = {nu:g}: must be above 0 and below {self.densest:g}"
+                )
+        return tuple(sorted(places))
+
+    def at(self, x: Field, e: float, slope: float) -> tuple[Field, Field, Coefficients]:
+        """nu, 1 - nu/nu* and the coefficients at x = nu/(1 - nu/nu*).
+
+        Raises:
+            InputError: where the law's function fails, naming it and the densities.
+        """
+        room = 1.0 / (1.0 + x / self.densest)
+        nu = x * room
+        return nu, room, self.coefficients(nu, room, e, slope)
 
 
 @dataclass(frozen=True)
@@ -94,9 +150,7 @@ class Reduced:
 
 def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
     """Combine the coefficients of ``law`` at x = nu/(1 - nu/nu*) >= 0 into :class:`Reduced`."""
-    room = 1.0 / (1.0 + x / law.densest)
-    nu = x * room
-    g = law.coefficients(nu, room, e, slope)
+    nu, _, g = law.at(x, e, slope)
     big_g = g.compressibility
     # A g1 with (2.12): nu A is finite at nu = 0, where A alone is not.
     nu_contact = nu * (1.0 + WALL_CONTACT) + WALL_CONTACT * 5.0 / (8.0 * g.radial)
