@@ -149,13 +149,24 @@ class Elements:
         log_mass = self.log_mass + fraction * (other.log_mass - self.log_mass)
         return Elements.sample(self.model, stretch, log_mass, s, values)
 
+    @property
+    def inner_places(self) -> Array:
+        """The ends of the grid, and the Gauss points of all elements between them, ascending."""
+        s = self._places
+        inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
+        return np.concatenate([s[:1], inner, s[-1:]])
+
+    def on(self, breaks: Array) -> Elements:
+        """The polynomials through values of the flow on other elements."""
+        values = self.at(kernel.places(breaks, _GAUSS[0]))
+        return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
+
     def halved(self) -> Elements:
         """The same polynomials on elements of half the length."""
         breaks = np.empty(2 * len(self.breaks) - 1)
         breaks[::2] = self.breaks
         breaks[1::2] = 0.5 * (self.breaks[1:] + self.breaks[:-1])
-        values = self.at(kernel.places(breaks, _GAUSS[0]))
-        return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
+        return self.on(breaks)
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a

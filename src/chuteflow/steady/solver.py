@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -12,8 +12,9 @@ from chuteflow.checks import real
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton
+from chuteflow.steady import kinks
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
-from chuteflow.steady.elements import MOST_ELEMENTS, Elements
+from chuteflow.steady.elements import MOST_ELEMENTS, Elements, Iterate
 from chuteflow.steady.model import Model
 from chuteflow.threads import on_one_thread
 
@@ -25,6 +26,8 @@ _FLOOR, _SAFETY = 1e-12, 4.0
 _STEP, _MOST_STEPS = 1e-7, 40
 #: After one below this the finer flow is as good as its mesh.
 _FINE_STEP = 2e-6
+#: Rounds in which the ends of elements come to where the flow passes a break of the law.
+_MOST_ROUNDS = 12
 #: The hold-up fixes a flow where it is this part of the change along the branch.
 _STEEP = 1e-3
 #: A grid resolves a flow where its integrals agree to this.
@@ -181,9 +184,9 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     very close to a fold.
     """
     weights, value = np.array(condition.weights), condition.value
-    coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)
+    coarse = _iterated(start, weights, value, _STEP)
     while np.isfinite(coarse.step):
-        fine = coarse.flow.halved().iterated(weights, value, _FINE_STEP, _MOST_STEPS, rounding=True)
+        fine = _iterated(coarse.flow.halved(), weights, value, _FINE_STEP, rounding=True)
         if not np.isfinite(fine.step):
             break
         change = float(np.abs(fine.quantities - coarse.quantities).max())
@@ -194,6 +197,21 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
             return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
         coarse = fine
     return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
+
+
+def _iterated(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:
+    """Newton's method until a step is below ``step``, on elements that end where the flow passes a break of the law."""
+    if not start.model.kinks.size:
+        return start.iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+    places = kinks.crossings(start)
+    for _ in range(_MOST_ROUNDS):
+        found = kinks.with_ends(start, places).iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+        if not np.isfinite(found.step):
+            break
+        start, places = found.flow, kinks.crossings(found.flow)
+        if kinks.distance(start, places) < kinks.MEETS:
+            return found
+    return replace(found, step=np.inf)
 
 
 def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
