@@ -28,7 +28,6 @@ from chuteflow.theory.hot import (
     hot_solution,
     slope_bounds,
 )
-from chuteflow.theory.laws import law
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ def hot(chute: Chute) -> HotModel:
     """
     if chute.surface != "free":
         raise InputError(f"surface = {chute.surface!r}: the model of hot flows has the surface 'free' alone")
-    limit = dilute(law(chute.closure), chute.restitution, chute.slope)
+    limit = dilute(chute.law, chute.restitution, chute.slope)
     parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     reason = parameters.obstacle
     return HotModel(

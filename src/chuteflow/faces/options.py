@@ -99,6 +99,21 @@ def _options(*decorators: Callable[[Command], Command]) -> Callable[[Command], C
     return add
 
 
+closure_options = _options(
+    option(
+        "--closure",
+        metavar="NAME",
+        help="Constitutive law: lun (the default), another of `chuteflow closures`, or FILE.py:NAME.",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="A parameter of the closure, such as --set packing=0.64; as often as there are any. "
+        "Or as part of its name: --closure extended:packing=0.64,radial=torquato.",
+    ),
+)
 chute_options = _options(
     option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
     option("--angle", type=Number(), help="Inclination theta in degrees."),
@@ -106,7 +121,7 @@ chute_options = _options(
     option("--ew", type=Number(), help="Restitution e_w of a grain and the base, from 0 to 1."),
     option("--roughness", type=Number(), help="Roughness r of the base, from 1/2 to sqrt(3)/2."),
     option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
-    option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier."),
+    closure_options,
 )
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
@@ -155,11 +170,25 @@ def chute(given: Mapping[str, Any]) -> Chute:
         what = "; ".join(f"{name} ({range_})" for name, range_ in allowed.items())
         raise InputError(f"missing {what}")
     others: dict[str, Any] = {name: given[option] for option, (name, _) in _MATERIAL.items()}
-    others |= {name: given[name] for name in ("surface", "closure") if given[name] is not None}
+    others |= words(given)
     if given["angle"] is not None:
         return Chute.at_angle(given["angle"], **others)
     others["slope"] = given["slope"]
     return Chute(**others)
+
+
+def words(given: Mapping[str, Any]) -> dict[str, str]:
+    """Surface and closure of the options, as far as they are given, as arguments of a Chute.
+
+    Raises:
+        InputError: for parameters of the closure that are not KEY=VALUE.
+    """
+    found = {name: given[name] for name in ("surface", "closure") if given[name] is not None}
+    if given["settings"]:
+        from chuteflow.theory.laws import settings_added
+
+        found["closure"] = settings_added(found.get("closure", "lun"), given["settings"])
+    return found
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:

@@ -30,7 +30,6 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import Solution, Status, checked_tolerance
 from chuteflow.theory.constitutive import Law, fingerprint
-from chuteflow.theory.laws import law
 
 #: What can be saved and loaded, and its names in the files.
 Result = Flow | FlowSet | Curve
@@ -113,7 +112,7 @@ def require_checksum(kept: Mapping[str, Any], rows: Iterable[Mapping[str, Any]] 
 
 def fingerprint_of(chute: Chute, registered: Law | None = None) -> list[float]:
     """Values of the law of ``chute``, by default the one that has its name now."""
-    return fingerprint(registered or law(chute.closure), chute.restitution, chute.slope)
+    return fingerprint(registered or chute.law, chute.restitution, chute.slope)
 
 
 def require_law(chute: Chute, kept: Mapping[str, Any]) -> None:

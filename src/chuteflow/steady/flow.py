@@ -222,7 +222,7 @@ class Flow:
     def validity(self) -> Validity:
         """How far the flow keeps to what the theory takes for granted."""
         problem, state = self.solution.problem, self._state
-        chosen = law(self.chute.closure)
+        chosen = self.law
         nu = _density(state.x, state.f)
         # Rounding does not let grains be packed to the last.
         room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)

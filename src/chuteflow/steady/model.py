@@ -25,7 +25,6 @@ from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Law, reduce, require_positive
-from chuteflow.theory.laws import law
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
@@ -193,7 +192,7 @@ def model(chute: Chute) -> Model:
     Raises:
         InputError: where that law has no meaning for the chute.
     """
-    return _registered(chute, law(chute.closure))
+    return _registered(chute, chute.law)
 
 
 @lru_cache(maxsize=256)
@@ -212,7 +211,7 @@ def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Mode
     """
     at = _parameters(chute) | {parameter: value}
     beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
-    chosen = law(chute.closure)
+    chosen = chute.law
     stepped = closure_table(chosen, beyond["restitution"], beyond["slope"])
     table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
     return _model(chute, chosen, at, table), _model(chute, chosen, beyond, stepped)

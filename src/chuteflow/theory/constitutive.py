@@ -17,8 +17,9 @@ theta is uniform wherever there is no heat flux, however the density varies.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -53,6 +54,24 @@ class Coefficients:
 
 
 @dataclass(frozen=True)
+class Unknown:
+    """The function of a law that is known by its description alone, such as that of a file written elsewhere."""
+
+    name: str
+
+    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+        """Nothing.
+
+        Raises:
+            InputError: always, saying what is missing.
+        """
+        raise InputError(
+            f"closure {self.name!r} is not registered here: what was saved can be read, but nothing more can be "
+            "computed with it before it is, or before it is given as FILE.py:NAME"
+        )
+
+
+@dataclass(frozen=True)
 class Law:
     """A constitutive law.
 
@@ -62,7 +81,11 @@ class Law:
     :class:`chuteflow.theory.formula.Formula`: laws with equal values of them are equal.
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
     is a function of nu and the slope. ``breaks`` are the volume fractions at which a coefficient is not smooth, or
-    a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words.
+    a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
+    the text by which it was asked for, where that was not its name, see :mod:`chuteflow.theory.laws`.
+
+    ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, shear)``, the
+    coefficients where the shear rate over sqrt(T) is ``shear``, for disturbed flows of a law that ``knows_slope``.
     """
 
     name: str
@@ -73,12 +96,21 @@ class Law:
     knows_slope: bool = False
     breaks: tuple[float, ...] | Callable[[float, float], tuple[float, ...]] = ()
     valid: str = ""
+    spec: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return self.spec or self.name
+
+    @property
+    def known(self) -> bool:
+        """Whether its function is at hand."""
+        return not isinstance(self.coefficients, Unknown)
 
     @classmethod
     def of(cls, name: str, description: str, source: str, formula: Any, valid: str = "") -> Law:
         """The law of a ``formula``, a dataclass of parameters that also has ``densest`` and ``breaks``."""
         knows_slope = hasattr(formula, "at_shear")
-        return cls(name, description, source, formula.densest, formula, knows_slope, formula.breaks, valid)
+        return cls(name, description, source, formula.densest, formula, knows_slope, valid=valid)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -99,7 +131,9 @@ class Law:
         if not settings:
             return self
         formula: Any = replace(cast(Any, self.coefficients), **settings)
-        return Law.of(self.name, self.description, self.source, formula, self.valid)
+        said = ",".join(f"{name}={value}" for name, value in settings.items())
+        spec = f"{self},{said}" if "=" in str(self).rpartition(":")[2] else f"{self}:{said}"
+        return replace(Law.of(self.name, self.description, self.source, formula, self.valid), spec=spec)
 
     def breaks_at(self, e: float, slope: float) -> tuple[float, ...]:
         """The volume fractions, ascending, at which a coefficient is not smooth at this restitution and slope.
@@ -107,7 +141,8 @@ class Law:
         Raises:
             InputError: for one that is not between 0 and the densest packing.
         """
-        places = self.breaks(e, slope) if callable(self.breaks) else self.breaks
+        own = getattr(self.coefficients, "breaks", self.breaks)
+        places = own(e, slope) if callable(own) else own
         for nu in places:
             if not 0.0 < nu < self.densest:
                 raise InputError(
@@ -123,7 +158,14 @@ class Law:
         """
         room = 1.0 / (1.0 + x / self.densest)
         nu = x * room
-        return nu, room, self.coefficients(nu, room, e, slope)
+        try:
+            found = self.coefficients(nu, room, e, slope)
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a law of the user may raise anything
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"closure {self}: its function fails at {_where(nu, e)}: {said}") from None
+        return nu, room, found
 
 
 @dataclass(frozen=True)
@@ -169,29 +211,61 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
     x = np.array([0.0, 0.3, 3.0])
-    room = 1.0 / (1.0 + x / law.densest)
-    g = law.coefficients(x * room, room, e, slope)
+    _, _, g = law.at(x, e, slope)
     values = [getattr(g, field.name) for field in fields(g)]
     return [law.densest, *np.concatenate([np.broadcast_to(value, x.shape) for value in values]).tolist()]
 
 
+def digest(law: Law, e: float, slope: float) -> str:
+    """What tells the values of ``law`` from those of another, to 9 digits, whatever its name."""
+    rounded = [f"{value:.9e}" for value in fingerprint(law, e, slope)]
+    return hashlib.sha256(" ".join(rounded).encode()).hexdigest()
+
+
+#: The functions of a law, by the fields of :class:`Coefficients`, and whether each must be positive.
+FUNCTIONS = {
+    "radial": ("g0", True),
+    "compressibility": ("g1/nu", True),
+    "compressibility_slope": ("d(g1/nu)/dnu", False),
+    "viscosity": ("g2", True),
+    "conductivity": ("g3", True),
+    "density_conductivity": ("g4", False),
+    "dissipation": ("g5/nu^2", False),
+    "bulk_viscosity": ("g6", False),
+}
+_TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
+
+
 def require_positive(law: Law, e: float, slope: float) -> None:
-    """Check that pressure, viscosity and conductivity stay positive at every density.
+    """Check that a law gives numbers at every density, and that pressure, viscosity and conductivity are positive.
 
     Raises:
-        InputError: where ``law`` loses its meaning at restitution ``e``.
+        InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
-    x = np.append(0.0, np.logspace(-4.0, 9.0, 261))
-    room = 1.0 / (1.0 + x / law.densest)
-    g = law.coefficients(x * room, room, e, slope)
-    checks = {
-        "g1": g.compressibility,
-        "g2": g.viscosity,
-        "g3": g.conductivity,
-    }
-    for what, values in checks.items():
-        if not np.all(np.isfinite(values)) or np.min(values) <= 0.0:
+    nu, _, g = law.at(_TRIED, e, slope)
+    if not isinstance(g, Coefficients):
+        raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")
+    for name, (symbol, positive) in FUNCTIONS.items():
+        try:
+            values = np.broadcast_to(np.asarray(getattr(g, name), dtype=float), nu.shape)
+        except (TypeError, ValueError):
+            shape = np.shape(getattr(g, name))
             raise InputError(
-                f"closure {law.name!r} has no positive {what} at restitution e = {e}: "
+                f"closure {law}: {symbol} ({name}) has the shape {shape} for nu of the shape {nu.shape}: must be the same"
+            ) from None
+        bad = ~np.isfinite(values) | ((values <= 0.0) if positive else (name == "dissipation") & (values < 0.0))
+        # A flux along the density gradient may grow like 1/nu where dilute.
+        bad[0] &= name != "density_conductivity"
+        if bad.any():
+            at = int(np.argmax(bad))
+            what = f"no positive {symbol}" if positive else f"no {symbol} that makes sense"
+            raise InputError(
+                f"closure {str(law)!r} has {what} at restitution e = {e}: it is {values[at]:g} at nu = {nu[at]:.6g}; "
                 "take a larger e or another closure"
             )
+    law.breaks_at(e, slope)
+
+
+def _where(nu: Field, e: float) -> str:
+    low, high = float(np.min(np.real(nu))), float(np.max(np.real(nu)))
+    return f"nu = {low:.6g}, e = {e}" if low == high else f"nu from {low:.6g} to {high:.6g}, e = {e}"

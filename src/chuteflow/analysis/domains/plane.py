@@ -21,7 +21,6 @@ from chuteflow.steady.chute import Chute
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
-from chuteflow.theory.laws import law
 
 #: The four parameters, as :class:`chuteflow.Chute` calls them; the last two are those of the base.
 PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
@@ -143,7 +142,7 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
-    return kinds(_fan(plane, replace(chute, **_neutral(plane)), law(chute.closure)), Base.of(chute))
+    return kinds(_fan(plane, replace(chute, **_neutral(plane)), chute.law), Base.of(chute))
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:
@@ -153,7 +152,7 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
     """
     chute = plane.chute_at(outer, inner)
-    closure = law(chute.closure)
+    closure = chute.law
     limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
     found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     gained, lost = found.F21 > 0.0, found.delta > 0.0

@@ -59,7 +59,7 @@ class Plane(click.ParamType):
 @options.option("--ew", type=options.NumberOrInterval(), help="Restitution e_w of a grain and the base; or LO:HI.")
 @options.option("--roughness", type=options.NumberOrInterval(), help="Roughness r of the base; or LO:HI.")
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options
 @options.output_options

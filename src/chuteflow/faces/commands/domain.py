@@ -65,7 +65,7 @@ class Numbers(click.ParamType):
     "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
 @options.output_options
