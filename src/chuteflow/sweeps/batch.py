@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Law, reduce
-from chuteflow.theory.laws import law
 
 Indices = NDArray[np.intp]
 
@@ -51,7 +50,7 @@ class Batch:
     @classmethod
     def of(
         cls,
-        closure: str,
+        closure: Law,
         surface: str,
         slope: Array,
         restitution: Array,
@@ -66,7 +65,7 @@ class Batch:
         ]
         empty, full = np.array(pairs, dtype=float).reshape(-1, 2).T
         losses = [boundary.base_loss(w, r) for w, r in zip(wall_restitution.tolist(), roughness.tolist(), strict=True)]
-        return cls(law(closure), surface, slope, restitution, slope * empty, slope * (full - empty), np.array(losses))
+        return cls(closure, surface, slope, restitution, slope * empty, slope * (full - empty), np.array(losses))
 
     def __len__(self) -> int:
         return len(self.slope)

@@ -32,7 +32,8 @@ from chuteflow.sweeps.designs import (
 )
 from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
-from chuteflow.theory.laws import LAWS
+from chuteflow.theory.constitutive import Law, digest
+from chuteflow.theory.laws import in_folder, law
 
 #: A list of numbers or words.
 Column = NDArray[Any]
@@ -46,8 +47,10 @@ CHUTE = {
 }
 #: Conditions: least and largest value.
 CONDITIONS = {"T_surface": WIDEST, "Q": (1e-12, 1e12), "M": (1e-12, DEEPEST), "h": (1e-12, 1e12)}
-#: Names, and what they are where a study does not give them.
-WORDS = {"surface": (SURFACES, "free"), "closure": (tuple(LAWS), "lun")}
+#: Names, and what they are where a study does not give them. Other closures that a study names are numbered after these.
+WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun")}
+#: Restitution and slope at which values of a law are taken, by which it is known again.
+_KNOWN_BY = (0.9, 0.3)
 #: Kinds of a flow that can be kept beside the numbers of the registry.
 KINDS = ("interior", "density", *JUDGED_KINDS)
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
@@ -84,6 +87,9 @@ class Study:
     canonical: str = field(default="", compare=False)
     #: Lists of values that are too long for the canonical form, by the name of their parameter.
     columns: Mapping[str, Column] = field(default_factory=dict, compare=False, repr=False)
+    #: The laws in the order of their numbers, and the folder to which those of files are relative.
+    laws: tuple[Law, ...] = field(default=(), compare=False, repr=False)
+    folder: Path = field(default_factory=Path, compare=False, repr=False)
 
     @property
     def points(self) -> int:
@@ -131,8 +137,11 @@ def read(path: str | os.PathLike[str]) -> Study:
     return from_dict(given, source.parent)
 
 
-def from_canonical(text: str, column: Callable[[str], Column] | None = None) -> Study:
-    """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it.
+def from_canonical(
+    text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()
+) -> Study:
+    """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it; laws
+    of files are looked for from ``folder``.
 
     Raises:
         InputError: for what is no canonical form, or a column that is not the one meant.
@@ -149,7 +158,13 @@ def from_canonical(text: str, column: Callable[[str], Column] | None = None) -> 
             parameters[name] = column(name)
             if _outline(parameters[name]) != value:
                 raise InputError(f"the list of parameters.{name} is damaged")
-    return from_dict(given | {"parameters": parameters}, Path())
+    closures = given.pop("closures", {})
+    study = from_dict(given | {"parameters": parameters}, folder)
+    known = _closures(study)
+    for name, kept in closures.items() if isinstance(closures, dict) else ():
+        if known.get(name) != kept:
+            raise InputError(f"the closure {name!r} is another now than that of the study: it gives other numbers")
+    return study
 
 
 def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
@@ -203,6 +218,8 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     )
     columns = {name: _column(name, value) for name, value in parameters.items() if _is_long(value)}
     object.__setattr__(study, "columns", columns)
+    object.__setattr__(study, "folder", folder.absolute())
+    object.__setattr__(study, "laws", tuple(_law(name, folder) for name in axes["closure"].words))
     object.__setattr__(study, "canonical", _canonical(study, kind, head, {**parameters, **columns}))
     return study
 
@@ -223,7 +240,27 @@ def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Map
         },
         "results": {"quantities": list(study.quantities), "flows": study.flows, "chunk": study.chunk},
     }
+    closures = _closures(study)
+    if closures:
+        whole["closures"] = closures
     return json.dumps(whole, allow_nan=False, separators=(",", ":"))
+
+
+def _law(name: str, folder: Path) -> Law:
+    try:
+        return law(in_folder(name, folder))
+    except InputError as error:
+        raise InputError(f"parameters.closure: {error}") from None
+
+
+def _closures(study: Study) -> dict[str, Any]:
+    """What the canonical form has of the laws that are not the paper's: their parameters, and what tells their values."""
+    names = study.design.axes["closure"].words
+    return {
+        name: {"law": chosen.name, "source": chosen.source, "parameters": chosen.parameters, "digest": digest(chosen, *_KNOWN_BY)}
+        for name, chosen in zip(names, study.laws, strict=True)
+        if name not in WORDS["closure"][0]
+    }
 
 
 def _is_long(value: Any) -> bool:

@@ -106,6 +106,11 @@ class Law:
         """Whether its function is at hand."""
         return not isinstance(self.coefficients, Unknown)
 
+    @property
+    def smooth(self) -> bool:
+        """Whether its coefficients are smooth at every density, restitution and slope."""
+        return not self.breaks and getattr(self.coefficients, "smooth", True)
+
     @classmethod
     def of(cls, name: str, description: str, source: str, formula: Any, valid: str = "") -> Law:
         """The law of a ``formula``, a dataclass of parameters that also has ``densest`` and ``breaks``."""

@@ -73,6 +73,11 @@ class Extended(Formula):
             points.add(FREEZING)
         return tuple(sorted(points))
 
+    @property
+    def smooth(self) -> bool:
+        """Whether there are no breaks at any e and slope."""
+        return super().smooth and self.length == "none"
+
     def _without_length(self, nu: Field, room: Field, e: float) -> Coefficients:
         g0, log_slope = self.radial_at(nu, room)
         x = nu * g0

@@ -62,6 +62,11 @@ class Formula:
         del e, slope
         return self._radial.breaks
 
+    @property
+    def smooth(self) -> bool:
+        """Whether there are no breaks at any e and slope."""
+        return not self._radial.breaks
+
     def radial_at(self, nu: Field, room: Field) -> tuple[Field, Field]:
         """g0 and g0'/g0."""
         return self._radial.function(nu, room, self.densest)

@@ -50,7 +50,7 @@ def law(asked: str | Law) -> Law:
     if asked in LAWS:
         return LAWS[asked]
     where, settings = _parts(asked)
-    found = _in_file(where) if ".py:" in where else _named(where)
+    found = _in_file(where) if _is_in_file(where) else _named(where)
     if not settings:
         return found
     values = {}
@@ -73,6 +73,15 @@ def settings_added(asked: str, settings: tuple[str, ...]) -> str:
     return where + (":" + ",".join(f"{name}={value}" for name, value in known.items()) if known else "")
 
 
+def in_folder(asked: str, folder: Path) -> str:
+    """The text ``asked`` with the file in it, if there is one, relative to ``folder``."""
+    where, settings = _parts(asked)
+    if not _is_in_file(where):
+        return asked
+    file, _, name = where.rpartition(":")
+    return settings_added(f"{folder / file}:{name}", tuple(f"{key}={value}" for key, value in settings.items()))
+
+
 def known_laws() -> dict[str, Law]:
     """All laws by name, with those of other packages.
 
@@ -86,6 +95,10 @@ def _parts(asked: str) -> tuple[str, dict[str, str]]:
     """The name or the file with its name, and the settings behind it."""
     where, colon, last = asked.rpartition(":")
     return (where, _settings(last)) if colon and "=" in last else (asked, {})
+
+
+def _is_in_file(where: str) -> bool:
+    return ".py:" in where
 
 
 def _settings(text: str) -> dict[str, str]:
