@@ -16,6 +16,7 @@ from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
+from chuteflow.theory.constitutive import Law, digest
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
 PARAMETERS = {
@@ -36,6 +37,7 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
         "chute": chute_object(flow_set.chute),
         "flows": [flow_object(flow, scales) for flow in flow_set],
         "searched": searched_object(flow_set.chute, flow_set.searched, scales),
+        "closure": closure_object(flow_set.chute, flow_set[0].law if len(flow_set) else None),
         "reason": flow_set.reason,
         "incomplete": flow_set.incomplete,
         **_units(scales, NUMBERS),
@@ -47,6 +49,7 @@ def single_flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, An
     return {
         "chute": chute_object(flow.chute),
         "flows": [flow_object(flow, scales)],
+        "closure": closure_object(flow.chute, flow.law),
         **_units(scales, NUMBERS),
     }
 
@@ -58,6 +61,7 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
         "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
         "counts": [_count(curve.chute, count, scales) for count in flux_counts(curve)],
         "searched": searched_object(curve.chute, curve.searched, scales),
+        "closure": closure_object(curve.chute),
         "reason": curve.reason,
         **_units(scales, PLACE),
     }
@@ -65,7 +69,23 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
 
 def chute_object(chute: Chute) -> dict[str, float | str]:
     """The parameters of a chute."""
-    return {short: getattr(chute, name) for short, name in PARAMETERS.items()}
+    values = chute.as_dict()
+    return {short: values[name] for short, name in PARAMETERS.items()}
+
+
+def closure_object(chute: Chute, known: Law | None = None) -> dict[str, Any]:
+    """The law of a chute whole: its name, parameters and source, and a digest of its values for these grains."""
+    law = known or chute.law
+    return {
+        "name": law.name,
+        "asked": str(chute.closure),
+        "description": law.description,
+        "source": law.source,
+        "valid": law.valid,
+        "densest": law.densest,
+        "parameters": law.parameters,
+        "digest": digest(law, chute.restitution, chute.slope),
+    }
 
 
 def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:

@@ -29,6 +29,8 @@ DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
 _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
+#: A piece of a grid is not shorter than this.
+_APART = 1e-6
 #: Elements at most, and pieces of a grid.
 MOST_ELEMENTS = 768
 MOST_PIECES = MOST_ELEMENTS // _PER_PIECE + 1
@@ -96,18 +98,21 @@ class Elements:
             lambda s: interpolation_matrix(problem.grid, s) @ theta_and_y,
         )
 
-    def grids(self) -> Iterator[tuple[Collocation, Array]]:
+    def grids(self, pins: Array) -> Iterator[tuple[Collocation, Array]]:
         """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to
         about 1e-8: between the ends of the elements the polynomials have no more digits.
 
-        Last comes one with a grid on each of some pieces.
+        Last comes one with a grid on each of some pieces, and that alone where there are ``pins``: places where the flow
+        passes a break of the law, at which pieces have to end.
         """
-        for degree in DEGREES:
+        for degree in () if pins.size else DEGREES:
             problem = Collocation(self.model, degree, self.stretch)
             z, y = self._unknowns(problem)
             if tail(problem.grid, np.stack([z[:-2] / np.abs(z[:-2]).max(), y / np.abs(y).max()]) + 1e-30) < _ROUGHLY:
                 yield problem, z
         inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
+        if pins.size:
+            inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
         yield problem, self._unknowns(problem)[0]
 

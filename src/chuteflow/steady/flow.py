@@ -106,7 +106,8 @@ class Flow:
 
     def __repr__(self) -> str:
         numbers = {NUMBERS[name].symbol: getattr(self, name) for name in PLACE}
-        return display.line("Flow", self.name, **numbers, error=self.error)
+        said = self.name if self.law.known else f"closure {self.law} not registered here"
+        return display.line("Flow", said, **numbers, error=self.error)
 
     def _repr_html_(self) -> str:
         rows = [(q.symbol, display.number(getattr(self, name)), q.description) for name, q in NUMBERS.items()]
@@ -142,7 +143,8 @@ class Flow:
     @property
     def law(self) -> Law:
         """The constitutive law that it was solved with, whatever is registered under its name now."""
-        return self._model.law
+        source = self.solution.source
+        return source if isinstance(source, Law) else self._model.law
 
     @property
     def error(self) -> float:

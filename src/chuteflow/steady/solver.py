@@ -16,6 +16,7 @@ from chuteflow.steady import kinks
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
 from chuteflow.steady.elements import MOST_ELEMENTS, Elements, Iterate
 from chuteflow.steady.model import Model
+from chuteflow.theory.constitutive import Law
 from chuteflow.threads import on_one_thread
 
 #: Relative tolerance in Q, h and M unless another is asked for.
@@ -66,14 +67,15 @@ class Condition:
 class Solution:
     """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended.
 
-    ``source`` is the flow on elements, as it was solved, or on a Chebyshev grid with its unknowns. ``rates`` (4,) are
+    ``source`` is the flow on elements, as it was solved, or on a Chebyshev grid with its unknowns; or the law that
+    would be needed for either, where a file was written with one that is not registered here. ``rates`` (4,) are
     the derivatives of the macroscopic quantities along the branch, with the value of the condition that was solved.
     """
 
     macroscopic: Array
     error: float
     status: Status
-    source: Elements | tuple[Collocation, Array]
+    source: Elements | tuple[Collocation, Array] | Law
     rates: Array | None = None
 
     @property
@@ -83,11 +85,17 @@ class Solution:
 
     @cached_property
     def elements(self) -> Elements:
-        """The flow on elements."""
-        return self.source if isinstance(self.source, Elements) else Elements.of_collocation(*self.source)
+        """The flow on elements.
+
+        Raises:
+            InputError: where its law is not known.
+        """
+        return self.source if isinstance(self.source, Elements) else Elements.of_collocation(*self._on_grid)
 
     @cached_property
     def _on_grid(self) -> tuple[Collocation, Array]:
+        if isinstance(self.source, Law):
+            self.source.at(np.zeros(1), 1.0, 1.0)  # says what is missing
         return self.source if isinstance(self.source, tuple) else collocate(self)
 
     @property
@@ -146,7 +154,8 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     value = np.array(float(weights @ solution.macroscopic))
     last: tuple[Collocation, Array] | None = None
     resolved = False
-    for problem, rough in solution.elements.grids():
+    elements = solution.elements
+    for problem, rough in elements.grids(kinks.crossings(elements)):
         found = newton(
             lambda z, problem=problem: _system(problem.state(z), weights, value),
             rough,
