@@ -75,7 +75,7 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         room = 1.0 / (1.0 + scaled / chosen.densest)
         nu = scaled * room
         (_, gamma), _ = density(_coordinate(scaled))
-        k = r.coupling * nu / (r.stiffness + r.coupling * nu)
+        k = r.drift / (r.stiffness + r.drift)
         return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())

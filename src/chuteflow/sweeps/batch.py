@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Law, reduce
+from chuteflow.theory.laws import law
 
 Indices = NDArray[np.intp]
 
@@ -50,7 +51,7 @@ class Batch:
     @classmethod
     def of(
         cls,
-        closure: Law,
+        closure: str | Law,
         surface: str,
         slope: Array,
         restitution: Array,
@@ -65,7 +66,7 @@ class Batch:
         ]
         empty, full = np.array(pairs, dtype=float).reshape(-1, 2).T
         losses = [boundary.base_loss(w, r) for w, r in zip(wall_restitution.tolist(), roughness.tolist(), strict=True)]
-        return cls(closure, surface, slope, restitution, slope * empty, slope * (full - empty), np.array(losses))
+        return cls(law(closure), surface, slope, restitution, slope * empty, slope * (full - empty), np.array(losses))
 
     def __len__(self) -> int:
         return len(self.slope)
@@ -114,7 +115,7 @@ class Along:
         self._batch, self._reduced = batch, r
         self.p, self.log_x, self.y = p, log_x, y
         self.nu = x * room
-        coupled = r.coupling * self.nu
+        coupled = r.drift
         stiff = r.stiffness + coupled
         self.coupling = coupled / stiff
         self.ease = 1.0 / (stiff * room)  # dL/dln x

@@ -141,7 +141,10 @@ def variables(study: Study) -> dict[str, Variable]:
         words = axis.words
         attributes: dict[str, Any] = {"long_name": _LONG_NAMES[name]}
         if words:
-            attributes |= {"flag_values": list(range(len(words))), "flag_meanings": " ".join(word.replace(" ", "_") for word in words)}
+            attributes |= {
+                "flag_values": list(range(len(words))),
+                "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
+            }
         else:
             attributes |= {"units": "1"}
         out[name] = Variable("int8" if words else "float64", -1 if words else float("nan"), False, attributes)

@@ -137,9 +137,7 @@ def read(path: str | os.PathLike[str]) -> Study:
     return from_dict(given, source.parent)
 
 
-def from_canonical(
-    text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()
-) -> Study:
+def from_canonical(text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()) -> Study:
     """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it; laws
     of files are looked for from ``folder``.
 
@@ -257,7 +255,12 @@ def _closures(study: Study) -> dict[str, Any]:
     """What the canonical form has of the laws that are not the paper's: their parameters, and what tells their values."""
     names = study.design.axes["closure"].words
     return {
-        name: {"law": chosen.name, "source": chosen.source, "parameters": chosen.parameters, "digest": digest(chosen, *_KNOWN_BY)}
+        name: {
+            "law": chosen.name,
+            "source": chosen.source,
+            "parameters": chosen.parameters,
+            "digest": digest(chosen, *_KNOWN_BY),
+        }
         for name, chosen in zip(names, study.laws, strict=True)
         if name not in WORDS["closure"][0]
     }

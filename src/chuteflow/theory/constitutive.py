@@ -40,7 +40,8 @@ class Coefficients:
 
     ``radial`` is g0; ``compressibility`` is G = g1/nu and ``compressibility_slope`` dG/dnu;
     ``viscosity`` g2; ``conductivity`` g3; ``density_conductivity`` g4;
-    ``dissipation`` g5/nu^2; ``bulk_viscosity`` g6.
+    ``dissipation`` g5/nu^2; ``bulk_viscosity`` g6. A law whose g4 grows like 1/nu where dilute also gives
+    ``density_flux`` = nu g4.
     """
 
     radial: Field
@@ -51,6 +52,7 @@ class Coefficients:
     density_conductivity: Field
     dissipation: Field
     bulk_viscosity: Field
+    density_flux: Field | None = None
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,8 @@ class Reduced:
     """What the steady problem needs of a law: functions of nu that are finite at nu = 0, arrays of one shape.
 
     - ``conduction`` = g3 nu/g1, with which y = conduction dtheta/dp;
-    - ``coupling`` = g4/g3, with theta = ln T - Gamma and dGamma/dnu = coupling;
+    - ``drift`` = nu g4/g3, with theta = ln T - Gamma and dGamma/dln nu = drift; where dilute it is -b, and b is 0 but
+      for laws whose g4 grows like 1/nu; ``coupling`` = (drift + b)/nu;
     - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
     - ``grip`` = A g1/g2, of the slip condition (3.16);
@@ -186,6 +189,7 @@ class Reduced:
     """
 
     conduction: Field
+    drift: Field
     coupling: Field
     loss: Field
     work: Field
@@ -199,11 +203,19 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
     """Combine the coefficients of ``law`` at x = nu/(1 - nu/nu*) >= 0 into :class:`Reduced`."""
     nu, _, g = law.at(x, e, slope)
     big_g = g.compressibility
+    if g.density_flux is None:
+        coupling = g.density_conductivity / g.conductivity
+        drift = coupling * nu
+    else:
+        drift = g.density_flux / g.conductivity
+        empty = nu == 0.0
+        coupling = np.where(empty, 0.0, (drift + dilute_drift(law, e, slope)) / np.where(empty, 1.0, nu))
     # A g1 with (2.12): nu A is finite at nu = 0, where A alone is not.
     nu_contact = nu * (1.0 + WALL_CONTACT) + WALL_CONTACT * 5.0 / (8.0 * g.radial)
     return Reduced(
         conduction=g.conductivity / big_g,
-        coupling=g.density_conductivity / g.conductivity,
+        drift=drift,
+        coupling=coupling,
         loss=g.dissipation / big_g,
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
@@ -213,12 +225,20 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
     )
 
 
+def dilute_drift(law: Law, e: float, slope: float) -> Any:
+    """b, the limit of -nu g4/g3 where dilute: 0 but for laws whose g4 grows like 1/nu."""
+    _, _, g = law.at(np.zeros(1), e, slope)
+    return 0.0 if g.density_flux is None else (-g.density_flux / g.conductivity)[0]
+
+
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
     x = np.array([0.0, 0.3, 3.0])
     _, _, g = law.at(x, e, slope)
-    values = [getattr(g, field.name) for field in fields(g)]
-    return [law.densest, *np.concatenate([np.broadcast_to(value, x.shape) for value in values]).tolist()]
+    # nu g4 is told by g4.
+    values = [getattr(g, name) for name in FUNCTIONS]
+    found = np.concatenate([np.broadcast_to(value, x.shape) for value in values])
+    return [law.densest, *np.where(np.isfinite(found), found, 0.0).tolist()]
 
 
 def digest(law: Law, e: float, slope: float) -> str:

@@ -111,8 +111,10 @@ class Extended(Formula):
         """L without its lower bound 1."""
         if self.length == "jenkins-berzi":
             # No cube root of zero, whose derivative is infinite: the length is 0 there.
-            return 0.25 * np.where(nu == 0.0, 0.0, np.where(nu == 0.0, 1.0, nu) ** (4.0 / 3.0)) * (
-                plain.radial ** (1.0 / 3.0) * per_density
+            return (
+                0.25
+                * np.where(nu == 0.0, 0.0, np.where(nu == 0.0, 1.0, nu) ** (4.0 / 3.0))
+                * (plain.radial ** (1.0 / 3.0) * per_density)
             )
         # J = (5 sqrt(pi)/8) g2/(nu^2 g0), so that sqrt(J) S is finite at nu = 0.
         j = 5.0 * _ROOT_PI / 8.0 * plain.viscosity / plain.radial

@@ -55,19 +55,24 @@ class GarzoDufty(Formula):
         collisional = 1.0 + 1.2 * f * x
         kappa = kinetic_kappa * collisional + 256.0 / (25.0 * np.pi) * nu * x * f * (1.0 + 7.0 * c / 32.0)
         if self.fourier:
-            density_conductivity = np.zeros_like(kappa)
+            density_flux, density_conductivity = None, np.zeros_like(kappa)
         else:
             pressure_slope = compressibility + nu * 2.0 * f * x_slope  # d(nu p*)/dnu
             lever = nu * log_slope
             mixed = e * lost + 0.25 * c * (4.0 / 3.0 + e * lost)
-            kinetic_mu = 2.0 * (
-                (1.0 + lever) * zeta * kinetic_kappa
-                + pressure_slope * c / 3.0
-                - 0.8 * x * (1.0 + 0.5 * lever) * f * mixed
-            ) / (2.0 * rate_kappa - 3.0 * zeta)
-            # It diverges at nu = 0.
+            kinetic_mu = (
+                2.0
+                * (
+                    (1.0 + lever) * zeta * kinetic_kappa
+                    + pressure_slope * c / 3.0
+                    - 0.8 * x * (1.0 + 0.5 * lever) * f * mixed
+                )
+                / (2.0 * rate_kappa - 3.0 * zeta)
+            )
+            density_flux = -_CONDUCTIVITY * kinetic_mu * collisional
+            # Elastic grains have none; it diverges at nu = 0 otherwise.
             with np.errstate(divide="ignore", invalid="ignore"):
-                density_conductivity = -_CONDUCTIVITY * kinetic_mu * collisional / nu
+                density_conductivity = np.where(density_flux == 0.0, 0.0, density_flux / nu)
         loss = self.loss_restitution(e)
         return Coefficients(
             radial=g0,
@@ -78,6 +83,7 @@ class GarzoDufty(Formula):
             density_conductivity=density_conductivity,
             dissipation=12.0 / _ROOT_PI * (1.0 - loss**2) * g0 * (1.0 + 3.0 * c / 32.0),
             bulk_viscosity=_VISCOSITY * gamma,
+            density_flux=density_flux,
         )
 
 

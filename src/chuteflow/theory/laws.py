@@ -46,7 +46,7 @@ def law(asked: str | Law) -> Law:
     if isinstance(asked, Law):
         return asked
     if not isinstance(asked, str):
-        raise InputError(f"closure {shown(asked)}: must be a name or a Law; choose one of {', '.join(LAWS)}")
+        raise InputError(f"unknown closure {shown(asked)}: must be a text or a Law; choose one of {', '.join(LAWS)}")
     if asked in LAWS:
         return LAWS[asked]
     where, settings = _parts(asked)
@@ -117,7 +117,7 @@ def _named(name: str) -> Law:
     entries = _entry_points()
     if name in entries:
         return _offered(name, entries[name])
-    known = ", ".join(sorted({*LAWS, *entries}))
+    known = ", ".join(dict.fromkeys((*LAWS, *entries)))
     raise InputError(f"unknown closure {name!r}: choose one of {known}, or FILE.py:NAME")
 
 
