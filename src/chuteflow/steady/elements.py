@@ -102,8 +102,8 @@ class Elements:
         """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to
         about 1e-8: between the ends of the elements the polynomials have no more digits.
 
-        Last comes one with a grid on each of some pieces, and that alone where there are ``pins``: places where the flow
-        passes a break of the law, at which pieces have to end.
+        Last comes one with a grid on each of some pieces, and that alone where there are ``pins``: places at which
+        pieces have to end, since the flow passes a break of the law there.
         """
         for degree in () if pins.size else DEGREES:
             problem = Collocation(self.model, degree, self.stretch)

@@ -21,7 +21,6 @@ from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
-from chuteflow.theory.laws import law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01

@@ -2,10 +2,11 @@
 
 # notation: s grid coordinate, L = ln x as in chuteflow.steady.model.
 
-A law with a break, such as max(1, .) or a radial distribution function in pieces, is smooth on either side of it. So is
-the flow, and polynomials on elements that meet there converge as they do for a smooth law. Where that is depends on the
-flow: it is found in a flow that is solved, elements are made to end there, and the flow is solved again. What an end that
-is off by d does to the flow is of the order of d^2 where the closures have a kink, so that this settles in a few rounds.
+A law with a break, such as max(1, .) or a radial distribution function in pieces, is smooth on either side of it. So
+is the flow, and polynomials on elements that meet there converge as they do for a smooth law. Where that is depends on
+the flow: it is found in a flow that is solved, elements are made to end there, and the flow is solved again. What an
+end that is off by d does to the flow is of the order of d^2 where the closures have a kink, so that this settles in a
+few rounds.
 """
 
 from __future__ import annotations

@@ -73,7 +73,6 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         scaled = x * np.exp(ratio)
         r = reduce(chosen, scaled, e, slope)
         room = 1.0 / (1.0 + scaled / chosen.densest)
-        nu = scaled * room
         (_, gamma), _ = density(_coordinate(scaled))
         k = r.drift / (r.stiffness + r.drift)
         return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)

@@ -86,7 +86,7 @@ class Formula:
         return radial(self.radial)
 
 
-def crossings(values: Field, places: Field, between) -> list[float]:  # noqa: ANN001
+def crossings(values: Field, places: Field, between) -> list[float]:
     """Zeros of a function between neighbouring ``places`` at which its ``values`` differ in sign, by bisection."""
     found = []
     for i in range(len(places) - 1):
