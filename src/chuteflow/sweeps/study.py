@@ -47,7 +47,7 @@ CHUTE = {
 }
 #: Conditions: least and largest value.
 CONDITIONS = {"T_surface": WIDEST, "Q": (1e-12, 1e12), "M": (1e-12, DEEPEST), "h": (1e-12, 1e12)}
-#: Names, and what they are where a study does not give them. Other closures that a study names are numbered after these.
+#: Names, and what they are where a study does not give them. Other closures of a study are numbered after these.
 WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun")}
 #: Restitution and slope at which values of a law are taken, by which it is known again.
 _KNOWN_BY = (0.9, 0.3)
@@ -252,7 +252,7 @@ def _law(name: str, folder: Path) -> Law:
 
 
 def _closures(study: Study) -> dict[str, Any]:
-    """What the canonical form has of the laws that are not the paper's: their parameters, and what tells their values."""
+    """What the canonical form has of the laws that are not the paper's: parameters, and what tells their values."""
     names = study.design.axes["closure"].words
     return {
         name: {

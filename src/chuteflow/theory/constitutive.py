@@ -86,8 +86,8 @@ class Law:
     a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
     the text by which it was asked for, where that was not its name, see :mod:`chuteflow.theory.laws`.
 
-    ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, shear)``, the
-    coefficients where the shear rate over sqrt(T) is ``shear``, for disturbed flows of a law that ``knows_slope``.
+    ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, rate)``, the
+    coefficients where the shear rate over nu sqrt(T) is ``rate``, for disturbed flows of a law that ``knows_slope``.
     """
 
     name: str
@@ -276,7 +276,8 @@ def require_positive(law: Law, e: float, slope: float) -> None:
         except (TypeError, ValueError):
             shape = np.shape(getattr(g, name))
             raise InputError(
-                f"closure {law}: {symbol} ({name}) has the shape {shape} for nu of the shape {nu.shape}: must be the same"
+                f"closure {law}: {symbol} ({name}) has the shape {shape} for nu of the shape {nu.shape}: "
+                "must be the same"
             ) from None
         bad = ~np.isfinite(values) | ((values <= 0.0) if positive else (name == "dissipation") & (values < 0.0))
         # A flux along the density gradient may grow like 1/nu where dilute.

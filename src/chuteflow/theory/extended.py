@@ -51,9 +51,9 @@ class Extended(Formula):
         plain = self._without_length(nu, room, e)
         return self._shortened(plain, nu, room, e, slope * plain.compressibility / plain.viscosity)
 
-    def at_shear(self, nu: Field, room: Field, e: float, shear: Field) -> Coefficients:
-        """The coefficients where the shear rate is ``shear`` = S, whatever the flow; nu > 0."""
-        return self._shortened(self._without_length(nu, room, e), nu, room, e, shear / nu)
+    def at_shear(self, nu: Field, room: Field, e: float, rate: Field) -> Coefficients:
+        """The coefficients where the shear rate over nu sqrt(T) is ``rate`` = S/nu, whatever the flow."""
+        return self._shortened(self._without_length(nu, room, e), nu, room, e, rate)
 
     def breaks(self, e: float, slope: float) -> tuple[float, ...]:
         """Those of the radial function, and where the length becomes 1 or takes another form."""
@@ -100,21 +100,21 @@ class Extended(Formula):
             bulk_viscosity=4.0 / (3.0 * _ROOT_PI) * f * nu * x,
         )
 
-    def _shortened(self, plain: Coefficients, nu: Field, room: Field, e: float, per_density: Field) -> Coefficients:
-        """``plain`` with its dissipation over max(1, L); ``per_density`` is S/nu."""
+    def _shortened(self, plain: Coefficients, nu: Field, room: Field, e: float, rate: Field) -> Coefficients:
+        """``plain`` with its dissipation over max(1, L); ``rate`` is S/nu."""
         if self.length == "none":
             return plain
-        length = self._length(plain, nu, room, e, per_density)
+        length = self._length(plain, nu, room, e, rate)
         return replace(plain, dissipation=plain.dissipation / np.where(np.real(length) > 1.0, length, 1.0))
 
-    def _length(self, plain: Coefficients, nu: Field, room: Field, e: float, per_density: Field) -> Field:
+    def _length(self, plain: Coefficients, nu: Field, room: Field, e: float, rate: Field) -> Field:
         """L without its lower bound 1."""
         if self.length == "jenkins-berzi":
             # No cube root of zero, whose derivative is infinite: the length is 0 there.
             return (
                 0.25
                 * np.where(nu == 0.0, 0.0, np.where(nu == 0.0, 1.0, nu) ** (4.0 / 3.0))
-                * (plain.radial ** (1.0 / 3.0) * per_density)
+                * (plain.radial ** (1.0 / 3.0) * rate)
             )
         # J = (5 sqrt(pi)/8) g2/(nu^2 g0), so that sqrt(J) S is finite at nu = 0.
         j = 5.0 * _ROOT_PI / 8.0 * plain.viscosity / plain.radial
@@ -123,7 +123,7 @@ class Extended(Formula):
         beyond = np.where(np.real(nu) > FREEZING, (nu - FREEZING) / left, 0.0)
         # Elastic grains lose nothing over whatever length.
         with np.errstate(divide="ignore"):
-            return np.sqrt(2.0 * j / (15.0 * lost)) * per_density * (1.0 + 26.0 / 15.0 * lost * beyond) ** 1.5
+            return np.sqrt(2.0 * j / (15.0 * lost)) * rate * (1.0 + 26.0 / 15.0 * lost * beyond) ** 1.5
 
 
 EXTENDED = Law.of(
