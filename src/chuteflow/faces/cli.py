@@ -36,7 +36,7 @@ class Commands(click.Group):
         """The command of this name."""
         if cmd_name not in COMMANDS:
             return None
-        return import_module(f"chuteflow.faces.commands.{cmd_name}").command
+        return import_module(f"chuteflow.faces.commands.{cmd_name.replace('-', '_')}").command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

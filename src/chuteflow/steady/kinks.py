@@ -19,6 +19,8 @@ from chuteflow.steady.elements import Elements
 
 #: Ends this close to a crossing of a break, in s, meet it.
 MEETS = 1e-13
+#: Ends farther from a crossing do not meet it, even if no round brings them nearer.
+NEAR = 1e-6
 #: An end that is not at a crossing gives way to one within this part of the element beside it.
 _GIVES_WAY = 0.3
 #: Rounds of the method of false position.

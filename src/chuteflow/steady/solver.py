@@ -213,12 +213,15 @@ def _iterated(start: Elements, weights: Array, value: float, step: float, *, rou
     if not start.model.kinks.size:
         return start.iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
     places = kinks.crossings(start)
+    distance = np.inf
     for _ in range(_MOST_ROUNDS):
         found = kinks.with_ends(start, places).iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
         if not np.isfinite(found.step):
             break
         start, places = found.flow, kinks.crossings(found.flow)
-        if kinks.distance(start, places) < kinks.MEETS:
+        before, distance = distance, kinks.distance(start, places)
+        # Rounding leaves more of a distance where the density hardly changes.
+        if distance < kinks.MEETS or (distance < kinks.NEAR and distance > 0.1 * before):
             return found
     return replace(found, step=np.inf)
 
