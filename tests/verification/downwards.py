@@ -10,7 +10,7 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-#: Share of the surface temperature at which the series at the surface ends: T and nu are those far above to first order in it.
+#: Where the integration begins, in parts of the surface temperature: T and nu are those far above to first order.
 START = 1e-10
 
 
@@ -38,14 +38,14 @@ def rates(law, e, slope, surface_stress):
     return derivative
 
 
-def down(law, e, slope, temperature, mass, rtol=1e-12):
-    """The state at the base of a flow with this temperature far above and hold-up, on the half-line."""
-    p = START * temperature
-    nu = p / temperature
-    G, _, g2, _, _, g5 = closures(law, 0.0, e, slope)
-    heat = -0.5 * (G**2 * slope**2 / g2 - g5) * math.sqrt(temperature) * p**2
-    state = [math.log(nu / closures(law, nu, e, slope)[0]), math.log(temperature), heat, temperature * p, 0.0]
-    state[4] = 0.5 * slope / g2 * math.sqrt(temperature) * p**2
+def down(law, e, slope, temperature, mass, beta=0.0, rtol=1e-12):
+    """The state at the base of a flow on the half-line with this hold-up, and T = ``temperature`` p^(-beta) far above."""
+    p = START * temperature ** (1.0 / (1.0 + beta))
+    T = temperature * p**-beta
+    G, _, g2, _, _, g5 = closures(law, p / T, e, slope)
+    heat = -(p**2) * math.sqrt(T) * (G**2 * slope**2 / g2 - g5) / (2.0 - 0.5 * beta)
+    glide = slope * G / g2 * math.sqrt(T) * p**2 / (2.0 - 0.5 * beta)
+    state = [math.log(p / (T * G)), math.log(T), heat, T * p / (1.0 - beta), glide]
     return carried(law, e, slope, state, p, mass, 0.0, rtol)
 
 

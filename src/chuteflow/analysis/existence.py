@@ -44,6 +44,9 @@ def imbalance(model: Model) -> str:
                 "and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
+    if model.beta != 0.0:
+        # There is no temperature far above, and no hot limit.
+        return "no flow balances the energy gained and lost"
     limit = dilute(model.law, chute.restitution, chute.slope)
     hot = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     if hot.delta > 0.0 and hot.F21 > 0.0 and hot.lambda_ > LAMBDA_C:

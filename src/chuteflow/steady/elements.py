@@ -29,6 +29,8 @@ DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
 _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
+#: Ends of elements in the first one, in parts of it, where T has no limit at the surface.
+_GRADED = 0.5 ** np.arange(48, 0, -1.0)
 #: A piece of a grid is not shorter than this.
 _APART = 1e-6
 #: Elements at most, and pieces of a grid.
@@ -75,6 +77,9 @@ class Elements:
         breaks = kernel.distribute(
             s, rough[:, 0] / _CHANGE, rough[:, 1], 1.0 / (_CHANGE_OF_FLUX * model.flux_scale), _LONGEST
         )
+        if model.unlimited:
+            # P dz has an integrable singularity at the surface there.
+            breaks = np.concatenate([breaks[:1], breaks[1] * _GRADED, breaks[1:]])
         return cls._through(model, stretch, log_mass, breaks, values(kernel.places(breaks, _GAUSS[0])))
 
     @classmethod
@@ -105,12 +110,15 @@ class Elements:
         Last comes one with a grid on each of some pieces, and that alone where there are ``pins``: places at which
         pieces have to end, since the flow passes a break of the law there.
         """
-        for degree in () if pins.size else DEGREES:
+        for degree in () if pins.size or self.model.unlimited else DEGREES:
             problem = Collocation(self.model, degree, self.stretch)
             z, y = self._unknowns(problem)
             if tail(problem.grid, np.stack([z[:-2] / np.abs(z[:-2]).max(), y / np.abs(y).max()]) + 1e-30) < _ROUGHLY:
                 yield problem, z
         inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
+        if self.model.unlimited:
+            inner = np.concatenate([self.breaks[1] * 2.0 ** np.arange(0, 40, 4), inner])
+            inner = np.unique(inner[inner < 0.9])
         if pins.size:
             inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
@@ -121,7 +129,7 @@ class Elements:
         theta, y = self.at(problem.grid.nodes).T
         mass = np.exp(self.log_mass)
         p = mass * problem.share[0] + self.model.surface_stress
-        f, _ = self.model.closures(p * np.exp(-theta))
+        f, _ = self.model.closures(self.model.density_argument(p, theta))
         return np.concatenate([mass * y / f[CONDUCTION], [theta[0], self.log_mass]]), y
 
     def at(self, s: Array) -> Array:

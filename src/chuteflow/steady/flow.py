@@ -309,15 +309,15 @@ class Flow:
         g = matrix @ state.g
         theta = matrix @ state.theta
         p = state.mass * share + self._model.surface_stress
-        x = p * np.exp(-theta)
+        x = self._model.density_argument(p, theta)
         f, _ = self._model.closures(x)
-        rise = p * g / state.mass
+        rise = p * g / state.mass - self._model.beta
         fields = {
             "p": p,
             "nu": _density(x, f),
             "y": f[CONDUCTION] * g / state.mass,
             "rise": rise,
-            "log_t": theta + f[GAMMA],
+            "log_t": self._model.log_temperature(p, theta, f[GAMMA]),
         }
         return fields, f
 
@@ -363,8 +363,17 @@ class Flow:
         problem, state = self.solution.problem, self._state
         g = problem.grid
         span = 1.0 / state.s_p  # dp/ds
-        per_fall = np.exp(state.theta - state.f[DENSITY])  # dz/d ln p, which is T_surface at p = 0
-        if self._model.surface_stress == 0.0:
+        if self._model.beta == 0.0:
+            per_fall = np.exp(state.theta - state.f[DENSITY])  # dz/d ln p, which is T_surface at p = 0
+        else:
+            per_fall = state.p / np.maximum(_density(state.x, state.f), _SMALLEST_SHARE)
+        if self._model.unlimited:
+            # Less what goes like p^(-1-beta); the first piece of the grid is too short to count.
+            beta = self._model.beta
+            power = state.p[1:] ** -(1.0 + beta)
+            regular = np.zeros_like(span)
+            regular[1:] = (per_fall[1:] / state.p[1:] - self.surface_temperature * power) * span[1:]
+        elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
             regular[0] = g.derivative[0] @ per_fall
@@ -378,7 +387,11 @@ class Flow:
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
         z = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[0]
-        if self._model.surface_stress == 0.0:
+        if self._model.unlimited:
+            beta, mass = self._model.beta, self._state.mass[0]
+            powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
+            z = z + self.surface_temperature / beta * powers
+        elif self._model.surface_stress == 0.0:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
@@ -407,14 +420,20 @@ class Flow:
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
         root_t = np.exp(0.5 * at["log_t"])
         s = stretch_position(share, self.solution.problem.stretch)
-        conducting = f[CONDUCTION] * root_t
+        conducting, beta = f[CONDUCTION] * root_t, self._model.beta
+        if beta == 0.0:
+            conductive = conducting * (rise + f[COUPLING] * (1.0 - rise))
+            along_density = -conducting * f[COUPLING] * (1.0 - rise)
+        else:
+            conductive = (1.0 + beta) * conducting * (rise + f[COUPLING] * (1.0 - rise))
+            along_density = conducting * (rise + beta) - conductive
         return {
             "volume_fraction": nu,
             "granular_temperature": root_t**2,
             "velocity": interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1],
             "heat_flux": at["y"] * p * root_t,
-            "conductive_heat_flux": conducting * (rise + f[COUPLING] * (1.0 - rise)),
-            "density_heat_flux": -conducting * f[COUPLING] * (1.0 - rise),
+            "conductive_heat_flux": conductive,
+            "density_heat_flux": along_density,
             "normal_stress": p,
             "shear_stress": -slope * p,
             "shear_rate": slope * f[WORK] * nu * root_t,
@@ -436,9 +455,9 @@ def rough_kinds(solution: Solution) -> tuple[float, float, float]:
     theta, y = elements.at(s).T
     share, _ = stretch_map(s, elements.stretch)
     p = mass * share + model.surface_stress
-    f, _ = model.closures(p * np.exp(-theta))
+    f, _ = model.closures(model.density_argument(p, theta))
     net = f[LOSS] - model.slope**2 * f[WORK]
-    return float((p * y / f[CONDUCTION]).max() - 1.0), float(net.min()), float(net.max())
+    return float((p * y / f[CONDUCTION]).max() - model.beta - 1.0), float(net.min()), float(net.max())
 
 
 @_vanishing

@@ -10,6 +10,14 @@ on p_S <= p <= p_S + M is
     y = a theta',    p T'/T = p theta' + k (1 - p theta'),    k = (g4/g3) dnu/dln x
     p y' + y + y (p T'/T)/2 = p (loss - s^2 work)    (3.9)
     y = y_S at p_S,    y = base(nu) at p_S + M       (3.17), (3.18) with F2 = g1 base
+
+A law whose g4 grows like 1/nu where dilute, g4 = -b g3/nu, has T ~ p^(-beta) there, beta = b/(1 - b), and no
+temperature far above. What stays finite is theta = (ln T - Gamma(nu))/(1 - b) with Gamma = -b ln nu + ..., which is
+ln T + beta ln p far above. With x = p^(1 + beta) exp(-theta), a and k with respect to these, Gamma = ln(x/g1), and
+
+    ln T = theta + Gamma - beta ln p,    p theta' - beta in place of p theta' on the right sides
+
+the problem is the same, and beta = 0 gives the one above.
 """
 
 from __future__ import annotations
@@ -21,10 +29,11 @@ from typing import Any
 
 import numpy as np
 
+from chuteflow.errors import InputError
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import Law, reduce, require_positive
+from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
@@ -61,9 +70,10 @@ def closure_table(closure: Law, e: float, slope: float) -> Table:
 # Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
 def _closure_table(chosen: Law, e: float, slope: float) -> Table:
+    b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
     scaled_breaks = np.array([nu / (1.0 - nu / chosen.densest) for nu in breaks])
-    density = _density_table(chosen, e, slope, _coordinate(scaled_breaks).tolist())
+    density = _density_table(chosen, e, slope, b, _coordinate(scaled_breaks).tolist())
     (log_ratio, _), _ = density(_coordinate(scaled_breaks))
     breaks_of_x = _coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
 
@@ -74,8 +84,12 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         r = reduce(chosen, scaled, e, slope)
         room = 1.0 / (1.0 + scaled / chosen.densest)
         (_, gamma), _ = density(_coordinate(scaled))
-        k = r.drift / (r.stiffness + r.drift)
-        return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
+        k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
+        # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
+        gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(room) + np.log(r.compressibility))
+        return np.stack(
+            [r.conduction * (1.0 - b), k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1
+        )
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
@@ -87,7 +101,7 @@ def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float, breaks: Sequence[float]) -> Table:
+def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence[float]) -> Table:
     """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
     ``breaks`` are places where the law is not smooth."""
 
@@ -104,7 +118,9 @@ def _density_table(chosen: Law, e: float, slope: float, breaks: Sequence[float])
         room = 1.0 / (1.0 + scaled / chosen.densest)
         (big_gamma,), _ = gamma(c)
         log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
-        return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
+        if np.all(b == 0.0):
+            return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
+        return np.stack([np.log(room) + (log_g + big_gamma) / (1.0 - b), big_gamma], axis=-1)
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
 
@@ -140,6 +156,22 @@ class Model:
     surface_flux: float
     base_loss: float
     slip_of_empty_base: float
+    beta: float
+
+    @property
+    def unlimited(self) -> bool:
+        """Whether the temperature has no limit far above, where it goes like p^(-beta)."""
+        return self.beta != 0.0 and self.surface_stress == 0.0
+
+    def density_argument(self, p: Array, theta: Array) -> Array:
+        """x at normal stresses ``p`` and potentials ``theta``: p exp(-theta) but where beta is not 0."""
+        if self.beta == 0.0:
+            return p * np.exp(-theta)
+        return np.exp((1.0 + self.beta) * log_stress(p) - theta)
+
+    def log_temperature(self, p: Array, theta: Array, gamma: Array) -> Array:
+        """ln T, given Gamma."""
+        return theta + gamma if self.beta == 0.0 else theta + gamma - self.beta * log_stress(p)
 
     def closures(self, x: Array) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
@@ -173,16 +205,26 @@ class Model:
 
     @cached_property
     def constants(self) -> Array:
-        """Slope, p_S, y_S, base loss, and the slip coefficient F1 as an affine function of shear and grip, (7,)."""
+        """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of shear and grip, beta, (8,)."""
         unit = np.zeros((8, 2))
         unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
         by_shear, by_grip = self.slip_slope(unit)
         return np.array(
             [
                 self.slope, self.surface_stress, self.surface_flux, self.base_loss,
-                self.slip_of_empty_base, by_shear, by_grip,
+                self.slip_of_empty_base, by_shear, by_grip, self.beta,
             ]
         )  # fmt: skip
+
+
+def beta_of(b: Any) -> Any:
+    """beta = b/(1 - b)."""
+    return b / (1.0 - b)
+
+
+def log_stress(p: Array) -> Array:
+    """ln p, as small as there are numbers at p = 0."""
+    return np.log(np.where(p == 0.0, np.finfo(float).tiny, p))
 
 
 def model(chute: Chute) -> Model:
@@ -198,6 +240,11 @@ def model(chute: Chute) -> Model:
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)
+    if chute.surface == "free" and dilute_drift(chosen, chute.restitution, chute.slope) >= 0.5:
+        raise InputError(
+            f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
+            "take a larger e, the surface interface or the Fourier form of the closure"
+        )
     return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope))
 
 
@@ -231,5 +278,6 @@ def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) 
         surface_stress=boundary.surface_stress(chute.surface),
         surface_flux=boundary.surface_flux(chute.surface, slope),
         base_loss=boundary.base_loss(parameters["wall_restitution"], roughness),
+        beta=beta_of(dilute_drift(chosen, parameters["restitution"], slope)),
         slip_of_empty_base=np.asarray(boundary.slip_coefficient(np.zeros(()), np.zeros(()), roughness, slope)).item(),
     )

@@ -231,6 +231,20 @@ def dilute_drift(law: Law, e: float, slope: float) -> Any:
     return 0.0 if g.density_flux is None else (-g.density_flux / g.conductivity)[0]
 
 
+def require_limit(law: Law, e: float, slope: float, what: str) -> None:
+    """Check that the temperature has a limit far above.
+
+    Raises:
+        InputError: where it grows without bound as the density vanishes; ``what`` needs the limit.
+    """
+    b = dilute_drift(law, e, slope)
+    if b != 0.0:
+        raise InputError(
+            f"closure {law}: T goes like p^({-b / (1.0 - b):.3g}) far above and has no limit there, which {what}: "
+            "take the Fourier form of the closure"
+        )
+
+
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
     x = np.array([0.0, 0.3, 3.0])

@@ -32,6 +32,11 @@ class GarzoDufty(Formula):
     fourier: bool = False
     kurtosis: bool = True
 
+    @property
+    def smooth(self) -> bool:
+        """Whether there are no breaks, nor a flux that grows like 1/nu where dilute."""
+        return super().smooth and self.fourier
+
     def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
         """The coefficients; ``slope`` does not enter."""
         del slope

@@ -20,7 +20,7 @@ import numpy as np
 from chuteflow.errors import InputError
 from chuteflow.numerics.first_order import Field, apply, apply_two, exp
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
+from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law, require_limit
 
 #: A field of the caller's kind of number.
 Number = Any
@@ -56,6 +56,7 @@ class Grains:
                 f"closure {self.law.name!r} knows the shear rate by the slope alone, which holds in steady flows: "
                 "take another closure for disturbed ones"
             )
+        require_limit(self.law, self.restitution, self.slope, "the conditions of disturbed flows need")
 
 
 @dataclass(frozen=True)

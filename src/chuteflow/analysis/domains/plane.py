@@ -19,7 +19,7 @@ from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
-from chuteflow.theory.constitutive import Law
+from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 
 #: The four parameters, as :class:`chuteflow.Chute` calls them; the last two are those of the base.
@@ -94,7 +94,8 @@ class Plane:
             raise InputError(f"both axes are {self.x.name}: give two parameters")
         for x in (self.x.low, self.x.high):
             for y in (self.y.low, self.y.high):
-                self.at(x, y)
+                corner = self.at(x, y)
+                require_limit(corner.law, corner.restitution, corner.slope, "maps need")
 
     def at(self, x: float, y: float) -> Chute:
         """The chute at values of the two parameters."""
