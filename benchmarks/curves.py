@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import by_auto
 import by_bice
 from chuteflow import Chute, Curve, curve, flows
-from chuteflow.steady.mapped_curve import mapped_curve
+from chuteflow.steady.mapped.curve import mapped_curve
 from timing import Row, forget_search, median_time
 
 Array = NDArray[np.float64]

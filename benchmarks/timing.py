@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chuteflow.analysis.families import families
+from chuteflow.branches.families import families
 from chuteflow.trajectories.refining import carry_down
 
 

@@ -1,8 +1,10 @@
-"""Flows, and built sites of the documentation, that several tests look at."""
+"""Flows, the explorer, and built sites of the documentation, that several tests look at."""
 
 import os
+import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -24,6 +26,34 @@ def three():
 def disturbances(three):
     """The disturbances of A, B and C."""
     return {name: Disturbances(flow) for name, flow in three.items()}
+
+
+class Served:
+    """The command in a process of its own; its address inside the block, and a clean end after it."""
+
+    def __enter__(self):
+        command = [sys.executable, "-m", "chuteflow", "explore", "--no-browser", "--port", "0"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        match = re.search(r"http://127\.0\.0\.1:\d+/", line)
+        assert match, line
+        return match[0]
+
+    def __exit__(self, *_):
+        self.process.send_signal(2)
+        timer = threading.Timer(20, self.process.kill)
+        timer.start()
+        _, complaints = self.process.communicate()
+        timer.cancel()
+        assert self.process.returncode == 0, complaints
+        assert "Traceback" not in complaints
+
+
+@pytest.fixture(scope="session")
+def served():
+    """The context manager that serves the explorer."""
+    return Served
 
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -55,7 +55,7 @@ def run(example: Example, names: dict[str, object], page: str) -> str:
 
 
 def _command(line: str, written: StringIO) -> None:
-    from chuteflow.faces.cli import main
+    from chuteflow.cli.program import main
 
     words = shlex.split(line, comments=True)
     if not words:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chuteflow.faces.cli import main
+from chuteflow.cli.program import main
 
 from .run_page import agree, examples
 

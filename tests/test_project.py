@@ -17,9 +17,26 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "chuteflow"
 
 # Ground floor first; a module imports from its own layer and from those before it.
-LAYERS = ("numerics", "theory", "steady", "trajectories", "analysis", "stability", "sweeps", "paper", "faces")
-# What `import chuteflow` offers is made of the layers up to this one, so only those above it may use it.
-PUBLIC_API = "analysis"
+LAYERS = (
+    "numerics",
+    "theory",
+    "steady",
+    "trajectories",
+    "branches",
+    "bifurcations",
+    "maps",
+    "stability",
+    "sweeps",
+    "io",
+    "plotting",
+    "paper",
+    "explorer",
+    "cli",
+)
+# What `import chuteflow` offers is made of the layers up to this one, so only those above it may use it; the version
+# is a number of its own, which files and stores name.
+PUBLIC_API = "io"
+VERSION = "chuteflow.__version__"
 
 MODULES = {
     ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts).removesuffix(".__init__"): path
@@ -101,7 +118,7 @@ def upward_edges(module: str, source: str, *, is_package: bool = False) -> list[
         target = layer_of(name)
         if target:
             upward = LAYERS.index(target) > height
-        elif name != "chuteflow" and ".".join(name.split(".")[:2]) in MODULES:
+        elif name == VERSION or (name != "chuteflow" and ".".join(name.split(".")[:2]) in MODULES):
             upward = False
         else:
             upward = height <= LAYERS.index(PUBLIC_API)
@@ -112,7 +129,75 @@ def upward_edges(module: str, source: str, *, is_package: bool = False) -> list[
 
 def test_every_folder_of_the_package_is_a_layer():
     folders = {path.relative_to(SOURCE).parts[0] for path in SOURCE.rglob("*.py") if path.parent != SOURCE}
-    assert folders <= set(LAYERS)
+    assert folders == set(LAYERS)
+
+
+def test_what_the_package_offers_is_not_above_its_layer():
+    homes = {name: layer_of(f"chuteflow.{home}") for name, home in chuteflow._HOMES.items()}
+    allowed = {None, *LAYERS[: LAYERS.index(PUBLIC_API) + 1]}
+    assert {name: layer for name, layer in homes.items() if layer not in allowed} == {}
+
+
+def module_named(name: str) -> str | None:
+    """The longest part of a dotted name that is a module of the package."""
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        if (found := ".".join(parts[:length])) in MODULES:
+            return found
+    return None
+
+
+def imported_at_once(module: str) -> set[str]:
+    """The modules that are imported when ``module`` is: not those of functions, nor of types alone."""
+    path = MODULES[module]
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    late = {
+        node.lineno
+        for part in ast.walk(tree)
+        if isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef)
+        or (isinstance(part, ast.If) and ast.unparse(part.test) == "TYPE_CHECKING")
+        for node in ast.walk(part)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    }
+    names = imported_from_package(module, path.read_text(encoding="utf-8"), is_package=path.name == "__init__.py")
+    found = {module_named(name) for line, name in names if line not in late}
+    return {name for name in found if name not in (None, "chuteflow", module)}
+
+
+def circles(imports: dict[str, set[str]]) -> set[str]:
+    """The modules that import one another in a circle: what is left when those that import nothing left are taken."""
+    left = {module: set(targets) for module, targets in imports.items()}
+    while done := [module for module, targets in left.items() if not targets & left.keys()]:
+        for module in done:
+            del left[module]
+    # The modules above a circle are left over too.
+    while done := [module for module in left if not any(module in targets for targets in left.values())]:
+        for module in done:
+            del left[module]
+    return set(left)
+
+
+def test_no_imports_go_in_a_circle():
+    assert circles({module: imported_at_once(module) for module in MODULES}) == set()
+
+
+def test_a_circle_of_imports_is_seen():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == {"b", "c"}
+    assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == set()
+
+
+@pytest.mark.parametrize("floor", ["paper", "explorer"])
+def test_nothing_but_the_command_line_imports_the_clients(floor):
+    found = [
+        f"{module}, line {line}, imports {name}"
+        for module, path in MODULES.items()
+        if layer_of(module) not in (floor, "cli")
+        for line, name in imported_from_package(
+            module, path.read_text(encoding="utf-8"), is_package=path.name == "__init__.py"
+        )
+        if layer_of(name) == floor
+    ]
+    assert found == []
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -129,11 +214,13 @@ def test_imports_go_downward(module):
         ("chuteflow.numerics.newton", "from chuteflow import theory"),
         ("chuteflow.numerics.newton", "from ..theory import closures"),
         ("chuteflow.theory.closures", "from chuteflow.steady.solver import solve"),
-        ("chuteflow.steady.solver", "def f():\n    from ..analysis import curves"),
-        ("chuteflow.analysis.curves", "from .. import paper"),
-        ("chuteflow.analysis.curves", "import chuteflow"),
-        ("chuteflow.analysis.curves", "from chuteflow import Chute"),
-        ("chuteflow.paper.figures", "from chuteflow.faces.plots import draw"),
+        ("chuteflow.steady.solver", "def f():\n    from ..branches import curve"),
+        ("chuteflow.branches.curve", "from .. import paper"),
+        ("chuteflow.branches.curve", "import chuteflow"),
+        ("chuteflow.branches.curve", "from chuteflow import Chute"),
+        ("chuteflow.io.files", "from chuteflow.plotting.plots import draw"),
+        ("chuteflow.io.files", "from chuteflow import Chute"),
+        ("chuteflow.paper.figures", "from chuteflow.cli.options import size"),
         ("chuteflow.errors", "from chuteflow import numerics"),
     ],
 )
@@ -147,7 +234,8 @@ def test_an_upward_import_is_seen(module, source):
         ("chuteflow.numerics.newton", "import numpy\nfrom . import grids\nfrom .grids import nodes"),
         ("chuteflow.steady.solver", "from ..theory.closures import f_1\nfrom chuteflow import numerics"),
         ("chuteflow.paper.figures", "import chuteflow\nfrom chuteflow import Chute, flows"),
-        ("chuteflow.faces.cli", "from .. import __version__\nfrom ..paper import figures"),
+        ("chuteflow.cli.program", "from .. import __version__\nfrom ..paper import figures"),
+        ("chuteflow.sweeps.store", "from chuteflow import __version__"),
     ],
 )
 def test_a_downward_import_is_allowed(module, source):
@@ -160,11 +248,11 @@ def test_a_package_is_the_base_of_its_relative_imports():
     ]
 
 
-def test_only_the_faces_print():
+def test_only_the_command_line_prints():
     calls = [
         f"{module}, line {node.lineno}"
         for module, path in MODULES.items()
-        if layer_of(module) != "faces"
+        if layer_of(module) != "cli"
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
     ]

@@ -7,7 +7,7 @@ import pytest
 
 import chuteflow
 from chuteflow import display
-from chuteflow.analysis.domains import Domain
+from chuteflow.maps import Domain
 from chuteflow.stability.along import MarkedBranch, MarkedCurve, Run, Sample
 from chuteflow.stability.neutral import NeutralCurve
 from chuteflow.stability.planes import FamilyMap, WaveMap

@@ -46,7 +46,7 @@ def test_the_package_has_the_same_bits_with_any_setting():
 def test_a_process_of_the_command_line_has_one_thread():
     code = (
         "import sys, threadpoolctl\n"
-        "from chuteflow.faces.cli import main\n"
+        "from chuteflow.cli.program import main\n"
         "sys.argv = ['chuteflow', 'hot', '--slope', '0.3', '--e', '0.8', '--ew', '0.8', '--roughness', '0.6']\n"
         "main()\n"
         "import scipy.linalg\n"

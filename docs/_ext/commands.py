@@ -9,7 +9,7 @@ from docutils import nodes
 from package import FromPackage
 from sphinx.application import Sphinx
 
-from chuteflow.faces.cli import chuteflow as program
+from chuteflow.cli.program import chuteflow as program
 
 #: An option in a sentence.
 _OPTION = re.compile(r"(--[a-z][\w-]*)")
@@ -25,7 +25,7 @@ class Commands(FromPackage):
         return [self._section(name, context) for name in program.list_commands(context)]
 
     def _section(self, name: str, parent: click.Context) -> nodes.section:
-        command = import_module(f"chuteflow.faces.commands.{name}").command
+        command = import_module(f"chuteflow.cli.commands.{name}").command
         context = click.Context(command, info_name=name, parent=parent)
         title = f"chuteflow {name}"
         section = nodes.section(ids=[f"chuteflow-{name}"], names=[title])

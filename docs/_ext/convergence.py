@@ -6,11 +6,11 @@ from package import FromPackage
 from sphinx.application import Sphinx
 
 from chuteflow import Flow, flows
-from chuteflow.faces.plots import write_figure
-from chuteflow.paper import style
 from chuteflow.paper.materials import dissipative
+from chuteflow.plotting import style
+from chuteflow.plotting.plots import write_figure
 from chuteflow.steady.collocation import LOG_Q
-from chuteflow.steady.mapped import LARGEST_DEGREE, best_multiple, solve_mapped
+from chuteflow.steady.mapped.solution import LARGEST_DEGREE, best_multiple, solve_mapped
 from chuteflow.steady.solver import Condition, prolong
 
 _FLUX = 3.0

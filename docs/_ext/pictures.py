@@ -16,7 +16,7 @@ from docutils.parsers.rst import directives
 from package import FromPackage
 from sphinx.application import Sphinx
 
-from chuteflow.faces.cli import main
+from chuteflow.cli.program import main
 from chuteflow.paper.captions import CAPTIONS
 from chuteflow.paper.figures import FIGURES
 

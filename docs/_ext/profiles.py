@@ -8,8 +8,8 @@ from package import FromPackage
 from sphinx.application import Sphinx
 
 from chuteflow import Chute, FlowSet, flows
-from chuteflow.faces.plots import write_figure
-from chuteflow.paper import style
+from chuteflow.plotting import style
+from chuteflow.plotting.plots import write_figure
 
 _FILE = "density-profiles.png"
 _COLUMNS = 6

@@ -8,7 +8,7 @@ from docutils import nodes
 from package import FromPackage
 from sphinx.application import Sphinx
 
-from chuteflow.analysis.results import KINDS
+from chuteflow.branches.results import KINDS
 from chuteflow.paper.claims import CLAIMS, VERDICTS, check, shown
 from chuteflow.steady import names
 from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity

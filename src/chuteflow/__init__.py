@@ -6,50 +6,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chuteflow.analysis.boundaries.boundary import Boundary, BoundarySet, Turning, boundary
-    from chuteflow.analysis.curve import curve
-    from chuteflow.analysis.domains.maps import Domain, domain
-    from chuteflow.analysis.enumeration import flows
-    from chuteflow.analysis.hot import HotModel, hot
-    from chuteflow.analysis.results import Branch, Curve, FlowSet, Searched, SpecialPoint
+    from chuteflow.bifurcations.boundary import Boundary, BoundarySet, Turning, boundary
+    from chuteflow.branches.curve import curve
+    from chuteflow.branches.enumeration import flows
+    from chuteflow.branches.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
-    from chuteflow.faces.files import load, save
+    from chuteflow.io.files import load, save
+    from chuteflow.maps.domain import Domain, domain
     from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
+    from chuteflow.steady.hot import HotModel, hot
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
 
 __version__ = "0.1.0"
 
 # Imported when first asked for, so that the command line starts quickly.
 _HOMES = {
-    "Boundary": "analysis.boundaries.boundary",
-    "BoundarySet": "analysis.boundaries.boundary",
-    "Branch": "analysis.results",
+    "Boundary": "bifurcations.boundary",
+    "BoundarySet": "bifurcations.boundary",
+    "Branch": "branches.results",
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
-    "Curve": "analysis.results",
-    "Domain": "analysis.domains.maps",
+    "Curve": "branches.results",
+    "Domain": "maps.domain",
     "Flow": "steady.flow",
-    "FlowSet": "analysis.results",
+    "FlowSet": "branches.results",
     "InputError": "errors",
     "Profile": "steady.flow",
     "QUANTITIES": "steady.quantities",
     "Quantity": "steady.quantities",
     "Scales": "steady.quantities",
-    "Searched": "analysis.results",
+    "Searched": "branches.results",
     "SolveError": "errors",
-    "SpecialPoint": "analysis.results",
-    "Turning": "analysis.boundaries.boundary",
-    "boundary": "analysis.boundaries.boundary",
+    "SpecialPoint": "branches.results",
+    "Turning": "bifurcations.boundary",
+    "boundary": "bifurcations.boundary",
     "Stability": "stability.verdict",
-    "HotModel": "analysis.hot",
-    "curve": "analysis.curve",
-    "domain": "analysis.domains.maps",
-    "flows": "analysis.enumeration",
-    "hot": "analysis.hot",
-    "load": "faces.files",
-    "save": "faces.files",
+    "HotModel": "steady.hot",
+    "curve": "branches.curve",
+    "domain": "maps.domain",
+    "flows": "branches.enumeration",
+    "hot": "steady.hot",
+    "load": "io.files",
+    "save": "io.files",
     "stability_of": "stability.verdict",
 }
 

@@ -9,14 +9,14 @@ def run() -> int:
     Interrupts are taken care of before anything large is imported, and up to the end of the process.
     """
     try:
-        from chuteflow.faces import interrupts
+        from chuteflow.cli import interrupts
 
         with interrupts.Interrupts(to_the_end=True):
-            from chuteflow.faces.cli import main
+            from chuteflow.cli.program import main
 
             return main()
     except KeyboardInterrupt:
-        from chuteflow.faces import interrupts
+        from chuteflow.cli import interrupts
 
         return interrupts.tell()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Branch, Chute, SpecialPoint, curve
-from chuteflow.paper.branches import in_order, runs
+from chuteflow.branches.lines import in_order, runs
 
 BRANCHES = {
     "one inversion": curve(Chute(0.3, 0.8, 0.8, 0.6), points=40).branches[0],

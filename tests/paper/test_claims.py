@@ -1,6 +1,7 @@
 """The claims: the table of them, the verdict on each, and that verdicts follow from what is computed."""
 
 import math
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import FrozenInstanceError, replace
@@ -33,6 +34,7 @@ from chuteflow.paper.materials import dissipative
 from chuteflow.steady.flow import Flow
 from chuteflow.theory.hot import HotSolution
 
+NOT_A_NUMBER = re.compile(r"\bnan\b")
 CORRECTED = {
     "all-inverted-on-steep-slopes",
     "base-traction",
@@ -162,9 +164,9 @@ def test_values_are_finite_and_said_in_words(verdicts, id):
         parts = list(value.values()) if isinstance(value, Mapping) else [value]
         assert parts
         assert all(isinstance(part, str) or (isinstance(part, float) and math.isfinite(part)) for part in parts)
-        assert "nan" not in shown(value)
+        assert not NOT_A_NUMBER.search(shown(value))
     assert found.reason.endswith(".")
-    assert "nan" not in found.reason
+    assert not NOT_A_NUMBER.search(found.reason)
     assert "inf " not in found.reason.replace("T_inf ", "")
 
 

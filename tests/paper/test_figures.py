@@ -8,11 +8,12 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from chuteflow.faces.cli import main
-from chuteflow.paper import figure_02, figure_03, style
+from chuteflow.cli.program import main
+from chuteflow.paper import figure_02, figure_03
 from chuteflow.paper.data import csv_text
 from chuteflow.paper.figures import FIGURES, figure, method_note
 from chuteflow.paper.sources import OVERBURDEN
+from chuteflow.plotting import style
 
 #: The caption of figure 2: T_surface, h and M, to the digits printed. The paper has 0.19 for the 0.197 of C.
 PRINTED = {"A": (7.34, 8.84, 0.44), "B": (2.54, 3.98, 0.59), "C": (0.197, 1.77, 1.26)}

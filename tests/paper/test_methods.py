@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from chuteflow import Curve, Flow, curve
-from chuteflow.faces.cli import main
+from chuteflow.branches.lines import in_order
+from chuteflow.cli.program import main
 from chuteflow.paper import figure_17
-from chuteflow.paper.branches import in_order
 from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.paper.sources import NOT_REACHED, OVERBURDEN, Mapped, MappedCurves, Source, Unreached, reach, source
 from chuteflow.steady.collocation import LOG_M, LOG_T
-from chuteflow.steady.mapped import MappedSolution
-from chuteflow.steady.mapped_curve import TOLERANCE, MappedCurve
+from chuteflow.steady.mapped.curve import TOLERANCE, MappedCurve
+from chuteflow.steady.mapped.solution import MappedSolution
 from chuteflow.steady.solver import Condition, resolve
 
 #: Figures of single flows, and those of curves.

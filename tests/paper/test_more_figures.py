@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, hot
-from chuteflow.analysis.hot import shoot
-from chuteflow.paper import figure_13, figure_14, style
+from chuteflow.paper import figure_13, figure_14
 from chuteflow.paper.data import csv_text
 from chuteflow.paper.figures import FIGURES, figure
 from chuteflow.paper.materials import dissipative
+from chuteflow.plotting import style
+from chuteflow.steady.hot import shoot
 
 NEW = sorted(set(FIGURES) - {2, 3})
 

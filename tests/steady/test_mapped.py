@@ -11,7 +11,7 @@ import pytest
 from chuteflow import Chute, Flow, InputError, curve, flows
 from chuteflow.numerics.continuation import Control, Point, fold_of, locate, trace
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.mapped import (
+from chuteflow.steady.mapped.solution import (
     DEGREES,
     MappedSolution,
     MappedSystem,

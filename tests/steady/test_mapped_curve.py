@@ -8,8 +8,8 @@ import pytest
 from chuteflow import Chute, InputError, curve, flows
 from chuteflow.numerics.continuation import trace
 from chuteflow.steady.collocation import LOG_Q, LOG_T
-from chuteflow.steady.mapped import solve_mapped
-from chuteflow.steady.mapped_curve import mapped_curve
+from chuteflow.steady.mapped.curve import mapped_curve
+from chuteflow.steady.mapped.solution import solve_mapped
 from chuteflow.steady.solver import Condition
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)

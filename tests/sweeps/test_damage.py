@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 import xarray
 
-from chuteflow.faces.cli import main
+from chuteflow.cli.program import main
 from chuteflow.sweeps import runner
 from chuteflow.sweeps import store as module
 from chuteflow.sweeps.engine import solve_chunk

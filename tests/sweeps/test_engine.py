@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
 from chuteflow.errors import InputError, SolveError
+from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps import engine
@@ -17,7 +18,7 @@ from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.marching import start
 from chuteflow.sweeps.numbers import DENSITIES, INTERIORS
 from chuteflow.sweeps.outcome import Reason, Status
-from chuteflow.sweeps.study import CHUTE, from_dict
+from chuteflow.sweeps.study import from_dict
 from chuteflow.theory.boundary import surface_stress
 
 VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0.3, 1e3)}
@@ -51,7 +52,7 @@ def random_study(condition, points, seed):
 
 def chute_of(chunk, i):
     p = chunk.parameters
-    slope, e, ew, roughness = (float(p[name][i]) for name in CHUTE)
+    slope, e, ew, roughness = (float(p[name][i]) for name in BY_KEY)
     surface, closure = SURFACES[int(p["surface"][i])], CLOSURES[int(p["closure"][i])]
     return Chute(slope, e, ew, roughness, surface, closure)
 

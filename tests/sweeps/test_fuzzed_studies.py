@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from chuteflow.faces.cli import main
+from chuteflow.cli.program import main
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.store import Marker, Store
 from chuteflow.sweeps.study import from_canonical, read

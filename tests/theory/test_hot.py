@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.special import i0, i0e, i1e, j0, j1, jn_zeros
 
-from chuteflow.analysis.hot import HotModel, hot, shoot
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady import solver
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, Collocation
 from chuteflow.steady.elements import Elements
+from chuteflow.steady.hot import HotModel, hot, shoot
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import reduce

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, boundary, curve, flows, hot, load, save, stability_of
-from chuteflow.analysis.domains.plane import Axis, Plane, summary
+from chuteflow.maps.plane import Axis, Plane, summary
 from chuteflow.theory.laws import LAWS
 from chuteflow.theory.lun import LUN
 

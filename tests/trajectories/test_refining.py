@@ -8,6 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
+from chuteflow.branches.families import doubt
+from chuteflow.branches.ranges import Range
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.refining import REFINEMENT, carry_down
@@ -116,7 +118,7 @@ def crossings_of(grid, mass):
 def test_branches_end_at_the_edges_of_the_range_alone(chute):
     grid = carry_down(model(chute), 1e-3, 1e5, 25.0)
     assert grid.complete
-    assert not len(grid.unresolved)
+    assert not len(grid.undecided)
     for branch in grid.branches:
         if branch.closed or len(branch) < 2:
             continue
@@ -157,3 +159,17 @@ def winding(random):
         net = f[LOSS] - slope**2 * f[WORK]
         if net[0] > 0.0 > net.min() and net[-1] > 0.0:
             return chute
+
+
+def test_a_cell_too_short_to_be_divided_in_which_the_residual_turns_to_zero_is_undecided():
+    """A coarse limit makes cells undecided that are divided otherwise; the flows there are named as doubtful."""
+    problem = model(WINDING[0])
+    coarse = carry_down(problem, 1e-3, 1e5, 25.0, replace(REFINEMENT, delta=0.8, finest=0.7))
+    fine = carry_down(problem, 1e-3, 1e5, 25.0)
+    assert len(coarse.undecided) > len(fine.undecided) == 0
+    assert coarse.hidden.shape == (len(coarse.undecided), 4)
+    assert (coarse.hidden[:, 2] <= np.log(25.0) + 1e-9).all()
+    assert fine.cells > coarse.cells > 1000
+    left = doubt(coarse, Range(1e-3, 1e5, 25.0, 0.0), [], "a flow")
+    assert left is not None
+    assert "does not tell flows apart near M = " in left

@@ -39,7 +39,7 @@ def rates(law, e, slope, surface_stress):
 
 
 def down(law, e, slope, temperature, mass, beta=0.0, rtol=1e-12):
-    """The state at the base of a flow on the half-line with this hold-up, and T = ``temperature`` p^(-beta) far above."""
+    """The state at the base of a flow on the half-line with this hold-up, and T ``temperature`` p^(-beta) far above."""
     p = START * temperature ** (1.0 / (1.0 + beta))
     T = temperature * p**-beta
     G, _, g2, _, _, g5 = closures(law, p / T, e, slope)

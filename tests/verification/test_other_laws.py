@@ -97,7 +97,7 @@ def test_where_the_centre_of_mass_is_infinite_or_nothing_is_known_far_above_says
         (Chute(*PAPER, closure="garzo-dufty"), lambda chute: stability_of(flows(chute, Q=3.0)[0], kx=0.1, ky=0.0)),
         (Chute(*PAPER, closure="garzo-dufty"), hot),
     ):
-        with pytest.raises(InputError, match="closure '?garzo-dufty"):
+        with pytest.raises(InputError, match=r"closure '?garzo-dufty"):
             run(chute)
 
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import Chute
-from chuteflow.paper import style
-from chuteflow.paper.branches import NUMBERS, in_order, runs, smooth
+from chuteflow.branches.lines import NUMBERS, SteadyBranch, in_order, runs, smooth
 from chuteflow.paper.data import Table, chute_note, stacked
-from chuteflow.paper.sources import Source, SteadyBranch, SteadyCurve, reach
+from chuteflow.paper.sources import Source, SteadyCurve, reach
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

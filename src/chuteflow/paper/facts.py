@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from chuteflow.paper.branches import in_order
+from chuteflow.branches.lines import SteadyFlow, in_order
 from chuteflow.paper.curves import Curves
 from chuteflow.paper.figure_01 import Figure1
 from chuteflow.paper.figure_03 import Figure3
@@ -14,7 +14,7 @@ from chuteflow.paper.figure_05 import Figure5
 from chuteflow.paper.figure_11 import Figure11
 from chuteflow.paper.figure_14 import TEMPERATURES, Figure14
 from chuteflow.paper.hot_profiles import FIELDS, HotProfiles
-from chuteflow.paper.sources import SteadyCurve, SteadyFlow
+from chuteflow.paper.sources import SteadyCurve
 
 Row = tuple[str, ...]
 _FLOW = ("flow", "Q", "h", "M", "T at the surface", "estimated relative error")

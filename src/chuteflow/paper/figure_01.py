@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import Profile, flows
-from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note
 from chuteflow.paper.materials import dissipative
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,19 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow.paper import style
-from chuteflow.paper.branches import NUMBERS, in_order
+from chuteflow.branches.lines import NUMBERS, SteadyBranch, SteadyFlow, in_order
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
-from chuteflow.paper.sources import (
-    OVERBURDEN,
-    SURFACE_TEMPERATURE,
-    Source,
-    SteadyBranch,
-    SteadyCurve,
-    SteadyFlow,
-    reach,
-)
+from chuteflow.paper.sources import OVERBURDEN, SURFACE_TEMPERATURE, Source, SteadyCurve, reach
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

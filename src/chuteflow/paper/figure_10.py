@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_plain, hot_end, trace
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

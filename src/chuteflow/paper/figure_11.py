@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import hot
-from chuteflow.paper import style
 from chuteflow.paper.data import Table, chute_note
 from chuteflow.paper.materials import dissipative
+from chuteflow.plotting import style
 from chuteflow.theory.hot import LAMBDA_C, inversion_lambda, slope_at
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """Figure 13: the reduced system at lambda = 1 against the full equations.
 
 The paper integrates the reduced system by a Runge-Kutta method; drawn here is its exact solution, which agrees with
-:func:`chuteflow.analysis.hot.shoot` to the errors of that method.
+:func:`chuteflow.steady.hot.shoot` to the errors of that method.
 """
 
 from __future__ import annotations

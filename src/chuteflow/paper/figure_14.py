@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import QUANTITIES, Chute, hot
-from chuteflow.analysis.domains import exists_at
-from chuteflow.paper import style
+from chuteflow.maps import exists_at
 from chuteflow.paper.data import Table
+from chuteflow.plotting import style
 from chuteflow.theory.hot import LAMBDA_C, inversion_lambda, slope_at
 
 if TYPE_CHECKING:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chuteflow import Profile
-from chuteflow.paper import style
+from chuteflow.branches.lines import SteadyFlow
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.materials import dissipative
-from chuteflow.paper.sources import OVERBURDEN, Source, SteadyFlow
+from chuteflow.paper.sources import OVERBURDEN, Source
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chuteflow.paper import style
 from chuteflow.paper.curves import Curves, draw_plain, frame, trace
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

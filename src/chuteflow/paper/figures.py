@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from chuteflow.paper import style
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,7 +78,7 @@ def computed(number: int, source: Source) -> FigureData:
 @style.own_settings()
 def drawn(number: int, data: FigureData) -> Figure:
     """The picture of ``data``, with a line above it where a method does not reach all flows."""
-    from chuteflow.paper import style
+    from chuteflow.plotting import style
 
     picture = figure(number).draw(data)
     if incomplete(data):

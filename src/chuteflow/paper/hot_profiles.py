@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import Profile, hot
-from chuteflow.paper import style
+from chuteflow.branches.lines import SteadyFlow
 from chuteflow.paper.data import Table, chute_note
-from chuteflow.paper.sources import Source, SteadyFlow
+from chuteflow.paper.sources import Source
+from chuteflow.plotting import style
 from chuteflow.theory.hot import HotParameters
 
 if TYPE_CHECKING:

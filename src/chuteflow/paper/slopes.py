@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chuteflow.paper import style
+from chuteflow.branches.lines import SteadyBranch
 from chuteflow.paper.curves import Curves, draw_densities, frame, name_slopes, trace
 from chuteflow.paper.materials import dissipative
-from chuteflow.paper.sources import Source, SteadyBranch
+from chuteflow.paper.sources import Source
+from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from chuteflow import Branch, Chute, Curve, Flow, SolveError, curve, flows
+from chuteflow import Chute, Curve, Flow, SolveError, curve, flows
+from chuteflow.branches.lines import SteadyFlow
 from chuteflow.processes import worker_pool
 from chuteflow.steady.collocation import LOG_Q, LOG_T
-from chuteflow.steady.mapped import LARGEST_DEGREE, MappedSolution, refine
-from chuteflow.steady.mapped_curve import CONTROL, TOLERANCE, MappedCurve, mapped_curve
+from chuteflow.steady.mapped.curve import CONTROL, TOLERANCE, MappedCurve, mapped_curve
+from chuteflow.steady.mapped.solution import LARGEST_DEGREE, MappedSolution, refine
 from chuteflow.steady.solver import Condition
 
 #: Surface temperatures of curves, and flows on the longest branch of the overburden method.
@@ -46,9 +47,7 @@ class MappedCurves:
     unreached: tuple[Unreached, ...]
 
 
-#: What figures draw; the methods name their numbers alike.
-SteadyFlow = Flow | MappedSolution
-SteadyBranch = Branch | MappedCurve
+#: What figures draw.
 SteadyCurve = Curve | MappedCurves
 
 

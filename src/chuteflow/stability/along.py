@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow import display
-from chuteflow.analysis.results import Branch, Curve, SpecialPoint
+from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
 from chuteflow.stability.family import flow_between

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chuteflow.analysis.paths import solve_between
+from chuteflow.branches.paths import solve_between
 from chuteflow.steady.flow import Flow
 
 

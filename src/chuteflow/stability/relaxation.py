@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import Radau
 
-from chuteflow.analysis.enumeration import flows
+from chuteflow.branches.enumeration import flows
 from chuteflow.checks import number
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array

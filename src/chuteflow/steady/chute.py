@@ -8,7 +8,7 @@ from typing import Any
 
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.theory.boundary import ROUGHNESS_RANGE
+from chuteflow.parameters import PARAMETERS
 from chuteflow.theory.constitutive import Law, require_positive
 from chuteflow.theory.laws import law
 
@@ -41,22 +41,8 @@ class Chute:
     closure: str | Law = "lun"
 
     def __post_init__(self) -> None:
-        for name in ("slope", "restitution", "wall_restitution", "roughness"):
-            object.__setattr__(self, name, number(name, getattr(self, name)))
-        if not 1e-8 <= self.slope <= 1e4:
-            raise InputError(f"slope = {self.slope}: tan(theta) must be positive (from 1e-8 to 1e4)")
-        if not 1e-8 <= self.restitution <= 1.0:
-            raise InputError(f"restitution e = {self.restitution}: must be above 0 (from 1e-8) and at most 1")
-        if not 0.0 <= self.wall_restitution <= 1.0:
-            raise InputError(f"wall restitution e_w = {self.wall_restitution}: must be from 0 to 1")
-        low, high = ROUGHNESS_RANGE
-        # sqrt(3)/2 typed with a few digits rounds up: give its last printed digits room.
-        if not low <= self.roughness <= high + 5e-5:
-            raise InputError(
-                f"roughness r = {self.roughness}: must be from 1/2 to sqrt(3)/2 = {high:.6f}, "
-                "where wall grains as large as the flowing ones leave no flat base to touch"
-            )
-        object.__setattr__(self, "roughness", min(self.roughness, high))
+        for name, parameter in PARAMETERS.items():
+            object.__setattr__(self, name, parameter.checked(getattr(self, name)))
         if self.surface not in SURFACES:
             raise InputError(f"unknown surface {self.surface!r}: choose one of {', '.join(SURFACES)}")
         if self.law.known:

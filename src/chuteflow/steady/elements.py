@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix, tail
 from chuteflow.steady import kernel
-from chuteflow.steady.collocation import Collocation, stretch_map, stretch_position
+from chuteflow.steady.collocation import Collocation
 from chuteflow.steady.kernel import STAGES
 from chuteflow.steady.model import CONDUCTION, Model
 
@@ -53,6 +52,11 @@ def _gauss() -> tuple[Array, Array, Array, Array]:
 _GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()
 
 
+def _graded(breaks: Array) -> Array:
+    """``breaks`` and more of them towards the surface, where P dz has an integrable singularity if T has no limit."""
+    return np.concatenate([breaks[:1], breaks[1] * _GRADED, breaks[1:]])
+
+
 @dataclass(frozen=True, eq=False)
 class Elements:
     """theta and y on the elements between ``breaks`` (N+1,), in the grid coordinate with one ``stretch``.
@@ -78,15 +82,14 @@ class Elements:
             s, rough[:, 0] / _CHANGE, rough[:, 1], 1.0 / (_CHANGE_OF_FLUX * model.flux_scale), _LONGEST
         )
         if model.unlimited:
-            # P dz has an integrable singularity at the surface there.
-            breaks = np.concatenate([breaks[:1], breaks[1] * _GRADED, breaks[1:]])
-        return cls._through(model, stretch, log_mass, breaks, values(kernel.places(breaks, _GAUSS[0])))
+            breaks = _graded(breaks)
+        nodal = np.ascontiguousarray(values(kernel.places(breaks, _GAUSS[0])))
+        return cls._through(model, stretch, log_mass, breaks, nodal)
 
     @classmethod
-    def _through(cls, model: Model, stretch: float, log_mass: float, breaks: Array, values: Array) -> Elements:
-        count = len(breaks) - 1
-        ends, slopes = np.empty((count + 1, 2)), np.empty((count, STAGES, 2))
-        kernel.fit(breaks, np.ascontiguousarray(values), _DIFFERENCES, ends, slopes)
+    def _through(cls, model: Model, stretch: float, log_mass: float, breaks: Array, nodal: Array) -> Elements:
+        ends, slopes = np.empty((len(breaks), 2)), np.empty((len(breaks) - 1, STAGES, 2))
+        kernel.fit(breaks, nodal, _DIFFERENCES, ends, slopes)
         return cls(model, stretch, breaks, ends, slopes, log_mass)
 
     @classmethod
@@ -138,34 +141,25 @@ class Elements:
         kernel.evaluate(self.breaks, self.ends, self.slopes, _CARDINAL, s, out)
         return out
 
-    def at_fraction(self, m: Array) -> Array:
-        """theta and y where the fractions ``m`` (k,) ascending of the overburden lie above, (k, 2)."""
-        return self.at(np.clip(stretch_position(m, self.stretch), 0.0, 1.0))
-
-    @cached_property
-    def _places(self) -> Array:
-        return kernel.places(self.breaks, _GAUSS[0])
-
     def adapted(self, stretch: float) -> Elements:
         """The same flow on elements chosen anew, with another stretch."""
         return self.blended(self, 0.0, stretch)
 
     def blended(self, other: Elements, fraction: float, stretch: float) -> Elements:
         """``fraction`` of the way to another flow, also beyond it, on elements that suit this one."""
-        s = kernel.positions(self._places, self.stretch, stretch)
-
-        def values(s: Array) -> Array:
-            m, _ = stretch_map(s, stretch)
-            here = self.at_fraction(m)
-            return here if fraction == 0.0 else here + fraction * (other.at_fraction(m) - here)
-
+        breaks, ends, slopes = kernel.blend(
+            self.breaks, self.ends, self.slopes, self.stretch, other.breaks, other.ends, other.slopes, other.stretch,
+            float(fraction), stretch, _GAUSS[0], _CARDINAL, _DIFFERENCES, _CHANGE,
+            1.0 / (_CHANGE_OF_FLUX * self.model.flux_scale), _LONGEST,
+        )  # fmt: skip
         log_mass = self.log_mass + fraction * (other.log_mass - self.log_mass)
-        return Elements.sample(self.model, stretch, log_mass, s, values)
+        found = Elements(self.model, stretch, breaks, ends, slopes, log_mass)
+        return found.on(_graded(breaks)) if self.model.unlimited else found
 
     @property
     def inner_places(self) -> Array:
         """The ends of the grid, and the Gauss points of all elements between them, ascending."""
-        s = self._places
+        s = kernel.places(self.breaks, _GAUSS[0])
         inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
         return np.concatenate([s[:1], inner, s[-1:]])
 
@@ -176,10 +170,8 @@ class Elements:
 
     def halved(self) -> Elements:
         """The same polynomials on elements of half the length."""
-        breaks = np.empty(2 * len(self.breaks) - 1)
-        breaks[::2] = self.breaks
-        breaks[1::2] = 0.5 * (self.breaks[1:] + self.breaks[:-1])
-        return self.on(breaks)
+        halves = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
+        return Elements(self.model, self.stretch, *halves, self.log_mass)
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a

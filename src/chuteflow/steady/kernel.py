@@ -102,8 +102,8 @@ def _assemble(
     """Residuals and derivatives of all elements, condensed; the macroscopic quantities and their derivatives.
 
     ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, and beta; ``ends`` (N+1, 2) theta
-    and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta, y and
-    mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
+    and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta,
+    y and mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
     respect to theta at the Gauss points. Where ``local`` has six columns the last two are changes by what rounding
     does. Returns the largest residual, or infinity.
@@ -407,6 +407,14 @@ def iterate(
         longest = max(np.abs(change_ends[0, : count + 1]).max(), abs(change_ends[0, count + 1, 0]))
         if not math.isfinite(longest):
             return mu, math.inf
+        if longest < tolerance:
+            # What the quantities change by is linear in so small a step.
+            ends += change_ends[0, : count + 1]
+            slopes += change_slopes[0]
+            last = np.empty(4)
+            _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[0], change_slopes[0], last)
+            quantities += last
+            return mu + change_ends[0, count + 1, 0], longest
         fraction = min(1.0, _LONGEST / longest)
         for _ in range(_HALVINGS):
             ends += fraction * change_ends[0, : count + 1]
@@ -425,8 +433,6 @@ def iterate(
         else:
             return mu, math.inf
         size = trial
-        if longest < tolerance:
-            return mu, longest
     return mu, math.inf
 
 
@@ -458,9 +464,60 @@ def direction(
 
 
 @compiled
-def positions(s: Any, stretch: float, other: float) -> Any:
-    """Grid coordinates with stretch ``other`` of the places ``s`` with another stretch."""
-    return np.log1p(np.expm1(stretch * s) / math.expm1(stretch) * math.expm1(other)) / other
+def _evaluate_elsewhere(
+    breaks: Any, ends: Any, slopes: Any, cardinal: Any, stretch: float, s: Any, other: float, out: Any
+) -> None:
+    """theta and y of a flow with a ``stretch`` at the grid coordinates ``s`` (k,) of the stretch ``other``."""
+    ratio = math.expm1(stretch) / math.expm1(other)
+    at = np.empty(len(s))
+    for i in range(len(s)):
+        at[i] = min(max(math.log1p(math.expm1(other * s[i]) * ratio) / stretch, 0.0), 1.0)
+    evaluate(breaks, ends, slopes, cardinal, at, out)
+
+
+@compiled
+def blend(
+    breaks: Any, ends: Any, slopes: Any, stretch: float, other_breaks: Any, other_ends: Any, other_slopes: Any,
+    other_stretch: float, fraction: float, after: float, points: Any, cardinal: Any, differences: Any, change: float,
+    per_flux: float, longest: float,
+) -> tuple[Any, Any, Any]:  # fmt: skip
+    """The flow ``fraction`` of the way from one to another, with the stretch ``after``: breaks, ends and slopes on
+    elements that suit the first."""
+    own = places(breaks, points)
+    rough = np.empty((len(own), 2))
+    evaluate(breaks, ends, slopes, cardinal, own, rough)
+    ratio = math.expm1(after) / math.expm1(stretch)
+    for i in range(len(own)):
+        own[i] = min(math.log1p(math.expm1(stretch * own[i]) * ratio) / after, 1.0)
+    new = distribute(own, rough[:, 0] / change, rough[:, 1], per_flux, longest)
+    s = places(new, points)
+    values = np.empty((len(s), 2))
+    _evaluate_elsewhere(breaks, ends, slopes, cardinal, stretch, s, after, values)
+    if fraction != 0.0:
+        there = np.empty((len(s), 2))
+        _evaluate_elsewhere(other_breaks, other_ends, other_slopes, cardinal, other_stretch, s, after, there)
+        for i in range(len(s)):
+            for c in range(2):
+                values[i, c] += fraction * (there[i, c] - values[i, c])
+    new_ends, new_slopes = np.empty((len(new), 2)), np.empty((len(new) - 1, STAGES, 2))
+    fit(new, values, differences, new_ends, new_slopes)
+    return new, new_ends, new_slopes
+
+
+@compiled
+def halve(breaks: Any, ends: Any, slopes: Any, points: Any, cardinal: Any, differences: Any) -> tuple[Any, Any, Any]:
+    """The same polynomials on elements of half the length: breaks, ends and slopes."""
+    new = np.empty(2 * len(breaks) - 1)
+    for e in range(len(breaks)):
+        new[2 * e] = breaks[e]
+        if e > 0:
+            new[2 * e - 1] = 0.5 * (breaks[e] + breaks[e - 1])
+    s = places(new, points)
+    values = np.empty((len(s), 2))
+    evaluate(breaks, ends, slopes, cardinal, s, values)
+    new_ends, new_slopes = np.empty((len(new), 2)), np.empty((len(new) - 1, STAGES, 2))
+    fit(new, values, differences, new_ends, new_slopes)
+    return new, new_ends, new_slopes
 
 
 @compiled

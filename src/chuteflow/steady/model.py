@@ -31,6 +31,7 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
+from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
@@ -43,8 +44,6 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 OFFSET = 0.2
 UPPER, _PIECES, _DEGREE = 4.2, 200, 7
 
-#: The parameters of a chute that are numbers.
-PARAMETERS = ("slope", "restitution", "wall_restitution", "roughness")
 #: Step along the imaginary axis of :func:`model_along`; its square is lost in rounding.
 IMAGINARY_STEP = 1e-20
 

@@ -26,7 +26,7 @@ _FLOOR, _SAFETY = 1e-12, 4.0
 #: Newton's method ends with a step below this, after which the next one would be below rounding; steps at most.
 _STEP, _MOST_STEPS = 1e-7, 40
 #: After one below this the finer flow is as good as its mesh.
-_FINE_STEP = 2e-6
+_FINE_STEP = 1e-6
 #: Rounds in which the ends of elements come to where the flow passes a break of the law.
 _MOST_ROUNDS = 12
 #: The hold-up fixes a flow where it is this part of the change along the branch.

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.analysis.ranges import DEEPEST, WIDEST
-from chuteflow.analysis.rough_turns import may_turn
+from chuteflow.branches.rough_turns import may_turn
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices

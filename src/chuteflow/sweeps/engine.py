@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.analysis.enumeration import flows as search
+from chuteflow.branches.enumeration import flows as search
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.sweeps.at_quantity import at_quantity
@@ -21,7 +22,7 @@ from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
-from chuteflow.sweeps.study import CHUTE, CONDITIONS, Study
+from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.constitutive import Law, require_positive
 
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
@@ -98,8 +99,8 @@ def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
 def _valid(study: Study, parameters: Mapping[str, Array], failures: dict[int, str]) -> NDArray[np.bool_]:
     """Which points are chutes with a condition in range; why the others are not, into ``failures``."""
     valid = np.ones(len(parameters["slope"]), dtype=bool)
-    for name in (*CHUTE, study.condition):
-        low, high = CHUTE[name][:2] if name in CHUTE else CONDITIONS[name]
+    for name in (*BY_KEY, study.condition):
+        low, high = RANGES[name]
         off = ~((parameters[name] >= low) & (parameters[name] <= high))
         for i in np.flatnonzero(off & valid).tolist():
             failures[i] = f"{name} = {parameters[name][i]:g}: must be from {low:g} to {high:g}"
@@ -151,7 +152,7 @@ def _groups(
 
 
 def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
-    roughness = np.minimum(parameters["roughness"][members], CHUTE["roughness"][1] - 5e-5)
+    roughness = np.minimum(parameters["roughness"][members], BY_KEY["roughness"].high)
     slope, e, ew = (np.ascontiguousarray(parameters[name][members]) for name in ("slope", "e", "ew"))
     return Batch.of(closure, surface, slope, e, ew, roughness)
 
@@ -229,7 +230,7 @@ def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
 def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str]) -> None:
     """Solve one point by the search of :func:`chuteflow.flows`."""
     p = out.parameters
-    slope, e, ew, roughness = (float(p[name][point]) for name in CHUTE)
+    slope, e, ew, roughness = (float(p[name][point]) for name in BY_KEY)
     surface, closure = SURFACES[int(p["surface"][point])], study.laws[int(p["closure"][point])]
     condition = {study.condition: float(p[study.condition][point])}
     try:

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import shown_path
 from chuteflow.sweeps.judged import JUDGED_NUMBERS
@@ -58,16 +59,10 @@ _DAMAGE = (ValueError, RuntimeError, LookupError, TypeError, OSError)
 _TITLE = "Every steady flow of many inclined chutes"
 _PAPER = "Woodhouse, Hogg & Sellar, Rapid granular flows down inclined planar chutes. Part 1, J. Fluid Mech. (2010)"
 _LONG_NAMES = {
-    "slope": "slope tan(theta) of the chute",
-    "e": "restitution of two grains",
-    "ew": "restitution of a grain and the base",
-    "roughness": "roughness r of the base",
+    **{key: parameter.description for key, parameter in BY_KEY.items()},
     "surface": "surface condition",
     "closure": "constitutive law",
-    "T_surface": "surface temperature asked for",
-    "Q": "mass flux asked for",
-    "M": "mass hold-up asked for",
-    "h": "centre of mass asked for",
+    **{key: f"{condition.description} asked for" for key, condition in CONDITIONS.items()},
 }
 
 

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.analysis.ranges import DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE, WIDEST, Range
+from chuteflow.branches.ranges import Range
 from chuteflow.checks import shown
 from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY, CONDITIONS, DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import SURFACES
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import (
@@ -31,22 +32,16 @@ from chuteflow.sweeps.designs import (
     shown_path,
 )
 from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
-from chuteflow.theory.boundary import ROUGHNESS_RANGE
 from chuteflow.theory.constitutive import Law, digest
 from chuteflow.theory.laws import in_folder, law
 
 #: A list of numbers or words.
 Column = NDArray[Any]
 
-#: Numbers of a chute: least and largest value, and their names in :class:`chuteflow.Chute`.
-CHUTE = {
-    "slope": (1e-8, 1e4, "slope"),
-    "e": (1e-8, 1.0, "restitution"),
-    "ew": (0.0, 1.0, "wall_restitution"),
-    "roughness": (ROUGHNESS_RANGE[0], ROUGHNESS_RANGE[1] + 5e-5, "roughness"),
+#: Least and largest values of the numbers of a study: of a chute, and conditions.
+RANGES = {key: (parameter.low, parameter.highest) for key, parameter in BY_KEY.items()} | {
+    key: (condition.low, condition.high) for key, condition in CONDITIONS.items()
 }
-#: Conditions: least and largest value.
-CONDITIONS = {"T_surface": WIDEST, "Q": (1e-12, 1e12), "M": (1e-12, DEEPEST), "h": (1e-12, 1e12)}
 #: Names, and what they are where a study does not give them. Other closures of a study are numbered after these.
 WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun")}
 #: Restitution and slope at which values of a law are taken, by which it is known again.
@@ -303,13 +298,13 @@ def _plain(value: Any) -> Any:
 
 def _checked_names(axes: Mapping[str, Axis]) -> str:
     """The condition among the parameters, once it is sure that they are complete."""
-    known = (*CHUTE, *CONDITIONS, *WORDS)
+    known = (*RANGES, *WORDS)
     for name in axes:
         if name not in known:
             raise InputError(f"unknown parameter {shown(name)}: choose from {', '.join(known)}")
-    missing = [name for name in CHUTE if name not in axes]
+    missing = [name for name in BY_KEY if name not in axes]
     if missing:
-        raise InputError(f"parameters.{missing[0]} is missing: the study needs {', '.join(CHUTE)} and a condition")
+        raise InputError(f"parameters.{missing[0]} is missing: the study needs {', '.join(BY_KEY)} and a condition")
     conditions = [name for name in CONDITIONS if name in axes]
     if len(conditions) != 1:
         got = ", ".join(conditions) or "none"
@@ -320,7 +315,7 @@ def _checked_names(axes: Mapping[str, Axis]) -> str:
 def _check_range(axis: Axis) -> None:
     if axis.name in WORDS:
         return
-    low, high = CHUTE[axis.name][:2] if axis.name in CHUTE else CONDITIONS[axis.name]
+    low, high = RANGES[axis.name]
     for value in axis.extremes:
         if not low <= value <= high:
             raise InputError(f"parameters.{axis.name} reaches {value:g}: must be from {low:g} to {high:g}")

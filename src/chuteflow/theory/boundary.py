@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 
+from chuteflow.parameters import PARAMETERS
 from chuteflow.theory.constitutive import Field
 
 #: Normal stress at the interface of Jenkins & Hanes (1993), (3.31) with its misprint mended.
 INTERFACE_STRESS = math.sqrt(math.pi) / 48.0
 
 #: Range of the roughness for wall grains of the size of the flowing ones, section 2.2.
-ROUGHNESS_RANGE = (0.5, math.sqrt(3.0) / 2.0)
+ROUGHNESS_RANGE = (PARAMETERS["roughness"].low, PARAMETERS["roughness"].high)
 
 
 def kappa(roughness: float) -> float:

@@ -3,7 +3,8 @@
 # notation: P overburden, p = P + p_S normal stress, L, y, a, k, net, b as in chuteflow.trajectories.tables;
 # A = (1 - k)/(2 a), c = 1 + k/2; B = y - b the residual of the base condition; tau = ln P + P/p_1 the step variable.
 
-With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0 for most laws. All arrays of a row are in the order of the curve.
+With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0
+for most laws. All arrays of a row are in the order of the curve.
 """
 
 from __future__ import annotations
@@ -25,19 +26,18 @@ from chuteflow.trajectories.tables import (
     CURVE_HIGH,
     CURVE_LOW,
     ENTRIES,
+    HEIGHT,
     INVERSE,
-    LOG_NU,
     LOW,
     NET,
     NET_ABOVE,
     NET_HIGH,
     NET_LOW,
     PER_UNIT,
-    POTENTIAL,
     RELAX_ABOVE,
     RELAX_HIGH,
+    SHEARING,
     SPREAD,
-    WORKED,
 )
 
 #: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden.
@@ -80,50 +80,60 @@ def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, f
 
 
 @compiled
-def _integrands(values: Any, slope: float, p_s: float, over: float, big_l: float) -> tuple[float, float]:
-    """P/nu and P du/dp."""
-    root_t = math.exp(0.5 * (math.log(over + p_s) + look_up(values, big_l, POTENTIAL) - big_l))
-    work = look_up(values, big_l, WORKED)
-    return over * math.exp(-big_l - look_up(values, big_l, LOG_NU)), over * work * slope * root_t
+def _integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[float, float]:
+    """P/nu and P du/dp, where ``shear`` is slope P sqrt(p)."""
+    at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
+    i = int(at)
+    t = at - i
+    root = math.exp(-0.5 * big_l)
+    height = values[i, HEIGHT] + t * (values[i + 1, HEIGHT] - values[i, HEIGHT])
+    shearing = values[i, SHEARING] + t * (values[i + 1, SHEARING] - values[i, SHEARING])
+    return over * root * root * height, shear * root * shearing
 
 
 @compiled
-def _advance(values: Any, slope: float, p_s: float, p_1: float, over: float, after: float, state: Any) -> None:
-    """One step of the classical Runge-Kutta method in tau from overburden ``over`` to ``after``; integrals by
-    Simpson."""
+def _lengths(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
+    """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau and slope P sqrt(p) at its ends and
+    middle into ``out`` (3, 3)."""
     half_tau = 0.5 * (math.log(after / over) + (after - over) / p_1)
-    middle = over
+    target = math.log(over) + over / p_1 + half_tau
     # The overburden in the middle of the step, by Newton's method in ln P.
     log_middle = 0.5 * (math.log(over) + math.log(after))
-    target = math.log(over) + over / p_1 + half_tau
     for _ in range(4):
         middle = math.exp(log_middle)
         log_middle -= (log_middle + middle / p_1 - target) / (1.0 + middle / p_1)
-    middle = math.exp(log_middle)
-    pace_0 = over / (1.0 + over / p_1)
-    pace_m = middle / (1.0 + middle / p_1)
-    pace_1 = after / (1.0 + after / p_1)
-    big_l, y = state[S_L], state[S_Y]
-    l_1, y_1 = _derivative(values, over + p_s, big_l, y)
-    l_2, y_2 = _derivative(values, middle + p_s, big_l + half_tau * pace_0 * l_1, y + half_tau * pace_0 * y_1)
-    l_3, y_3 = _derivative(values, middle + p_s, big_l + half_tau * pace_m * l_2, y + half_tau * pace_m * y_2)
-    l_m = big_l + half_tau * pace_m * l_3
-    l_4, y_4 = _derivative(
-        values, after + p_s, big_l + 2.0 * half_tau * pace_m * l_3, y + 2.0 * half_tau * pace_m * y_3
-    )
-    third = half_tau / 3.0
-    state[S_L] = big_l + third * (pace_0 * l_1 + 2.0 * pace_m * (l_2 + l_3) + pace_1 * l_4)
-    state[S_Y] = y + third * (pace_0 * y_1 + 2.0 * pace_m * (y_2 + y_3) + pace_1 * y_4)
-    h_0, g_0 = _integrands(values, slope, p_s, over, big_l)
-    h_m, g_m = _integrands(values, slope, p_s, middle, l_m)
-    h_1, g_1 = _integrands(values, slope, p_s, after, state[S_L])
-    state[S_H] += third * (h_0 * pace_0 + 4.0 * h_m * pace_m + h_1 * pace_1)
-    state[S_G] += third * (g_0 * pace_0 + 4.0 * g_m * pace_m + g_1 * pace_1)
+    out[0, 0], out[1, 0], out[2, 0] = over, math.exp(log_middle), after
+    for c in range(3):
+        out[c, 1] = out[c, 0] / (1.0 + out[c, 0] / p_1)
+        out[c, 2] = slope * out[c, 0] * math.sqrt(out[c, 0] + p_s)
+    return half_tau
 
 
 @compiled
-def _surface(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, state: Any) -> None:
-    """A state close to the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
+def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, rows: Any, j: int) -> None:
+    """One step of state ``j`` by the classical Runge-Kutta method in tau, of which :func:`_lengths` tells the lengths;
+    integrals by Simpson."""
+    p_0, p_m, p_1 = lengths[0, 0] + p_s, lengths[1, 0] + p_s, lengths[2, 0] + p_s
+    rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]
+    big_l, y = rows[j, S_L], rows[j, S_Y]
+    l_1, y_1 = _derivative(values, p_0, big_l, y)
+    l_2, y_2 = _derivative(values, p_m, big_l + half_tau * rate_0 * l_1, y + half_tau * rate_0 * y_1)
+    l_3, y_3 = _derivative(values, p_m, big_l + half_tau * rate_m * l_2, y + half_tau * rate_m * y_2)
+    l_m = big_l + half_tau * rate_m * l_3
+    l_4, y_4 = _derivative(values, p_1, big_l + 2.0 * half_tau * rate_m * l_3, y + 2.0 * half_tau * rate_m * y_3)
+    third = half_tau / 3.0
+    rows[j, S_L] = big_l + third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
+    rows[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
+    h_0, g_0 = _integrands(values, lengths[0, 0], lengths[0, 2], big_l)
+    h_m, g_m = _integrands(values, lengths[1, 0], lengths[1, 2], l_m)
+    h_1, g_1 = _integrands(values, lengths[2, 0], lengths[2, 2], rows[j, S_L])
+    rows[j, S_H] += third * (h_0 * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
+    rows[j, S_G] += third * (g_0 * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+
+
+@compiled
+def _start(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, rows: Any, j: int) -> None:
+    """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
         beta = values[0, BETA]
         half = values[0, NET] / (2.0 - 0.5 * beta)
@@ -132,18 +142,18 @@ def _surface(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, 
         net, k = look_up(values, big_l, NET), look_up(values, big_l, COUPLED)
         share = 3.0 + 0.5 * beta
         heating = v + k * (1.0 - v) + beta
-        state[S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
+        rows[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
         fraction = 1.0 / (1.0 - beta)
     else:
         big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
         l_p, y_p = _derivative(values, p_s, big_l, y_s)
         big_l += over * l_p
-        state[S_Y] = y_s + over * y_p
+        rows[j, S_Y] = y_s + over * y_p
         fraction = 0.5
-    state[S_L] = big_l
-    h, g = _integrands(values, slope, p_s, over, big_l)
-    state[S_H] = fraction * h * over
-    state[S_G] = 0.5 * g * over
+    rows[j, S_L] = big_l
+    h, g = _integrands(values, over, slope * over * math.sqrt(over + p_s), big_l)
+    rows[j, S_H] = fraction * h * over
+    rows[j, S_G] = 0.5 * g * over
 
 
 @compiled
@@ -177,8 +187,10 @@ def _place(big_l: float) -> float:
 
 
 @compiled
-def _distance(one: Any, other: Any, per_flux: float) -> float:
-    return math.hypot(_place(one[S_L]) - _place(other[S_L]), (one[S_Y] - other[S_Y]) * per_flux)
+def _distance(rows: Any, j: int, per_flux: float) -> float:
+    """Of position j of the curve from the next."""
+    apart = _place(rows[j, S_L]) - _place(rows[j + 1, S_L])
+    return math.sqrt(apart * apart + ((rows[j, S_Y] - rows[j + 1, S_Y]) * per_flux) ** 2)
 
 
 @compiled
@@ -192,8 +204,8 @@ def _limited_slope(before: float, after: float, d_before: float, d_after: float)
 
 
 @compiled
-def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, out: Any) -> None:
-    """The state at ``t`` of the way from position j of the curve to the next: a monotonic cubic."""
+def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, out: Any, k: int) -> None:
+    """The state at ``t`` of the way from position j of the curve to the next, into ``out[k]``: a monotonic cubic."""
     d = length[j]
     for q in range(rows.shape[1]):
         rise = rows[j + 1, q] - rows[j, q]
@@ -203,39 +215,38 @@ def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, o
         if j + 2 < n and open_[j + 1]:
             right = _limited_slope(rise, rows[j + 2, q] - rows[j + 1, q], d, length[j + 1])
         # One-sided slopes at the ends of a piece are those of the chord.
-        out[q] = rows[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
+        out[k, q] = rows[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
+
+
+@compiled
+def _bend(rows: Any, j: int, n: int, open_: Any, length: Any, q: int) -> tuple[float, float]:
+    """How much more quantity ``q`` changes by its slopes at position j of the curve, and at the next, than between
+    them: the slopes are those of parabolas through three positions."""
+    d = length[j]
+    rise = rows[j + 1, q] - rows[j, q]
+    left = right = 0.0
+    if j > 0 and open_[j - 1]:
+        left = ((rows[j, q] - rows[j - 1, q]) * d / length[j - 1] - rise) * d / (d + length[j - 1])
+    if j + 2 < n and open_[j + 1]:
+        right = ((rows[j + 2, q] - rows[j + 1, q]) * d / length[j + 1] - rise) * d / (d + length[j + 1])
+    return left, right
 
 
 @compiled
 def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: Any, length: Any) -> bool:
     """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
     where it does along the cubic through the two states, or comes half of the way to it."""
-    d = length[j]
-    slopes = np.empty((2, 2))
-    for q in range(2):
-        secant = (rows[j + 1, q] - rows[j, q]) / d
-        slopes[0, q] = slopes[1, q] = secant
-        if j > 0 and open_[j - 1]:
-            beside = (rows[j, q] - rows[j - 1, q]) / length[j - 1]
-            slopes[0, q] = (beside * d + secant * length[j - 1]) / (d + length[j - 1])
-        if j + 2 < n and open_[j + 1]:
-            beside = (rows[j + 2, q] - rows[j + 1, q]) / length[j + 1]
-            slopes[1, q] = (beside * d + secant * length[j + 1]) / (d + length[j + 1])
-    changes = 0
     before, last = residual[j], residual[j + 1]
     least = min(abs(before), abs(last))
+    rise_l, rise_y = rows[j + 1, S_L] - rows[j, S_L], rows[j + 1, S_Y] - rows[j, S_Y]
+    left_l, right_l = _bend(rows, j, n, open_, length, S_L)
+    left_y, right_y = _bend(rows, j, n, open_, length, S_Y)
+    changes = 0
     nearest = least
     for c in range(1, _BETWEEN + 1):
         t = c / (_BETWEEN + 1.0)
-        big_l = y = 0.0
-        for q in range(2):
-            rise = rows[j + 1, q] - rows[j, q]
-            bend = (1.0 - t) * (slopes[0, q] * d - rise) - t * (slopes[1, q] * d - rise)
-            value = rows[j, q] + t * rise + t * (1.0 - t) * bend
-            if q == S_L:
-                big_l = value
-            else:
-                y = value
+        big_l = rows[j, S_L] + t * (rise_l + (1.0 - t) * ((1.0 - t) * left_l - t * right_l))
+        y = rows[j, S_Y] + t * (rise_y + (1.0 - t) * ((1.0 - t) * left_y - t * right_y))
         here = y - look_up(values, big_l, BASE)
         changes += int((here >= 0.0) != (before >= 0.0))
         nearest = min(nearest, abs(here))
@@ -299,207 +310,224 @@ def carry(
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
     where it was inserted, the first position of each row (R + 1,), zeros of B: left or upper position, right or lower
-    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), positions of edges that were not
-    resolved (U,), and how the curve ended.
+    position, fraction between (Z, 3), their neighbours along the zero set (Z, 2), the first states of the cells that
+    could not be decided (U,), how many cells were looked at, and how the curve ended.
     """
     n = len(log_t)
-    room = 64 * n + 1024
-    states = np.empty((room, 5))
-    came_from = np.empty(room)
+    states = np.empty((64 * n + 1024, 5))
+    came_from = np.empty(len(states))
     first = np.zeros(len(overburden) + 1, np.int64)
-    zero_places = np.empty((256, 3))
+    zeros = np.empty((256, 3))
     links = np.full((256, 2), -1, np.int64)
-    unresolved = np.empty(64, np.int64)
-    n_zeros = n_unresolved = total = 0
+    undecided = np.empty(64, np.int64)
+    n_zeros = n_undecided = total = cells = 0
     status = DONE
 
-    current = np.empty((n, 5))
-    theta = theta_s.copy()
-    in_series = np.zeros(n, np.bool_)
-    open_ = np.ones(n, np.bool_)
-    region = np.zeros(n, np.int64)
-    frozen = np.zeros(n, np.bool_)
-    above = np.full(n, -1, np.int64)  # position in the row before
-    old_b = np.empty(n)
-    old_open = np.ones(n, np.bool_)
-    old_edge = np.full(n, -1, np.int64)
-    inserted = np.empty(5)
+    # The curve: n positions in use of these.
+    rows = np.empty((4 * n, 5))
+    theta = np.empty(len(rows))  # heat potential at the surface
+    in_series = np.zeros(len(rows), np.bool_)
+    frozen = np.zeros(len(rows), np.bool_)  # no longer advanced
+    open_ = np.ones(len(rows), np.bool_)  # whether the curve goes on to the next position
+    region = np.empty(len(rows), np.int64)
+    residual = np.empty(len(rows))
+    length = np.empty(len(rows))  # distance from the next position
+    edge = np.empty(len(rows), np.int64)  # zero between a position and the next
+    # The same positions in the row before: place among the states, residual, zero towards the next, and where they
+    # are now, since some are inserted between.
+    above = np.full(len(rows), -1, np.int64)
+    above_residual = np.empty(len(rows))
+    above_edge = np.full(len(rows), -1, np.int64)
+    moved = np.empty(len(rows), np.int64)
+    side = np.empty(len(rows), np.int64)  # zero of a trajectory since the row before
+    wanted = np.empty(len(rows), np.int64)  # how many to insert after a position
+    inserted = np.empty((len(rows), 5))
+    lengths = np.empty((3, 3))
     cell_nodes = np.empty(64, np.int64)
     cell_places = np.empty((64, 2))
+    theta[:n] = theta_s
+    rows[:n, S_T] = log_t
 
     for row in range(len(overburden)):
         over = overburden[row]
         p = over + p_s
         # Advance.
+        half_tau = _lengths(slope, p_s, p_1, overburden[row - 1], over, lengths) if row > 0 else 0.0
         for j in range(n):
             if row == 0 or in_series[j]:
-                warmth = math.exp(theta[j] / (1.0 + values[0, BETA]))
-                near = p_s == 0.0 and over <= min(START * warmth, start_at_most)
-                if row == 0 or near:
-                    current[j, S_T] = log_t[j] if row == 0 else current[j, S_T]
-                    _surface(values, slope, p_s, y_s, theta[j], over, current[j])
-                    in_series[j] = p_s == 0.0
+                warmth = theta[j] / (1.0 + values[0, BETA])
+                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(warmth), start_at_most))
+                if row == 0 or in_series[j]:
+                    _start(values, slope, p_s, y_s, theta[j], over, rows, j)
                     continue
-                in_series[j] = False
             if not frozen[j]:
-                _advance(values, slope, p_s, p_1, overburden[row - 1], over, current[j])
-                if not (current[j, S_Y] > _COLDEST / per_flux) or current[j, S_L] > _DENSEST:
-                    current[j, S_Y] = _COLDEST / per_flux
-                    current[j, S_L] = min(max(current[j, S_L], LOW), _DENSEST)
-                    if not math.isfinite(current[j, S_H]):
-                        current[j, S_H] = 1e300
-                    if not math.isfinite(current[j, S_G]):
-                        current[j, S_G] = 1e300
+                _advance(values, p_s, half_tau, lengths, rows, j)
+                if not (rows[j, S_Y] > _COLDEST / per_flux) or rows[j, S_L] > _DENSEST:
+                    rows[j, S_Y] = _COLDEST / per_flux
+                    rows[j, S_L] = min(max(rows[j, S_L], LOW), _DENSEST)
+                    if not math.isfinite(rows[j, S_H]):
+                        rows[j, S_H] = 1e300
+                    if not math.isfinite(rows[j, S_G]):
+                        rows[j, S_G] = 1e300
                     frozen[j] = True
-        # Insert.
-        length = np.empty(n)
-        wanted = np.zeros(n, np.int64)
-        residual = np.empty(n)
+        # Where to insert; a cell is undecided where that is not enough.
+        for j in range(n):
+            region[j] = COLD if frozen[j] else region_of(bounds, p, rows[j, S_L], rows[j, S_Y])
+            residual[j] = rows[j, S_Y] - look_up(values, rows[j, S_L], BASE)
+        for j in range(n - 1):
+            length[j] = max(_distance(rows, j, per_flux), 1e-14)
         extra = 0
         for j in range(n):
-            region[j] = COLD if frozen[j] else region_of(bounds, p, current[j, S_L], current[j, S_Y])
-            residual[j] = current[j, S_Y] - look_up(values, current[j, S_L], BASE)
-        for j in range(n - 1):
-            length[j] = max(_distance(current[j], current[j + 1], per_flux), 1e-14)
-        for j in range(n - 1):
-            if not open_[j] or (region[j] != FREE and region[j] == region[j + 1]):
+            wanted[j] = 0
+            if j + 1 == n or not open_[j] or (region[j] != FREE and region[j] == region[j + 1]):
                 continue
+            cells += 1
+            limited = False
             if length[j] > delta:
                 wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-            elif length[j] > finest and _hides_zeros(values, current, residual, j, n, open_, length):
-                wanted[j] = 1
+                limited = length[j] > 2.0 * delta * (wanted[j] + 1)
+            elif not in_series[j]:
+                doubtful = _hides_zeros(values, rows, residual, j, n, open_, length)
+                wanted[j] = 1 if doubtful and length[j] > finest else 0
+                limited = doubtful and length[j] <= finest
+            if limited:
+                undecided = _grown(undecided, n_undecided + 1)
+                undecided[n_undecided] = j + extra + total
+                n_undecided += 1
             extra += wanted[j]
         if total + n + extra > most:
             status = FULL
             first[row + 1 :] = total
             break
         m = n + extra
-        new = np.empty((m, 5))
-        new_theta = np.empty(m)
-        new_series = np.zeros(m, np.bool_)
-        new_open = np.ones(m, np.bool_)
-        new_region = np.empty(m, np.int64)
-        new_frozen = np.zeros(m, np.bool_)
-        new_above = np.empty(m)
-        moved = np.empty(n, np.int64)
-        at = 0
-        for j in range(n):
-            moved[j] = at
-            new[at] = current[j]
-            new_theta[at] = theta[j]
-            new_series[at] = in_series[j]
-            new_region[at] = region[j]
-            new_frozen[at] = frozen[j]
-            new_above[at] = above[j]
-            new_open[at] = open_[j]
-            at += 1
-            for c in range(wanted[j]):
-                t = (c + 1.0) / (wanted[j] + 1.0)
-                _interpolate(current, j, n, open_, length, t, inserted)
-                new[at] = inserted
-                new_theta[at] = theta[j] + t * (theta[j + 1] - theta[j])
-                new_series[at] = in_series[j] and in_series[j + 1]
-                new_region[at] = region_of(bounds, p, inserted[S_L], inserted[S_Y])
-                new_above[at] = above[j] + t * (above[j + 1] - above[j])
-                at += 1
-        # Store the row.
         states = _grown(states, total + m)
         came_from = _grown(came_from, total + m)
-        states[total : total + m] = new
-        came_from[total : total + m] = new_above
+        for j in range(n):
+            moved[j] = j
+        if extra > 0:
+            inserted = _grown(inserted, extra)
+            k = 0
+            for j in range(n):
+                for c in range(wanted[j]):
+                    _interpolate(rows, j, n, open_, length, (c + 1.0) / (wanted[j] + 1.0), inserted, k)
+                    k += 1
+            if m > len(rows):
+                rows, theta, in_series, frozen = (
+                    _grown(rows, m),
+                    _grown(theta, m),
+                    _grown(in_series, m),
+                    _grown(frozen, m),
+                )
+                open_, region, residual, length = (
+                    _grown(open_, m),
+                    _grown(region, m),
+                    _grown(residual, m),
+                    _grown(length, m),
+                )
+                edge, above, above_residual = _grown(edge, m), _grown(above, m), _grown(above_residual, m)
+                above_edge, moved, side, wanted = (
+                    _grown(above_edge, m),
+                    _grown(moved, m),
+                    _grown(side, m),
+                    _grown(wanted, m),
+                )
+            # From the end of the curve, so that nothing is overwritten before it has moved.
+            at = m
+            for j in range(n - 1, -1, -1):
+                for c in range(wanted[j] - 1, -1, -1):
+                    at -= 1
+                    k -= 1
+                    t = (c + 1.0) / (wanted[j] + 1.0)
+                    for q in range(5):
+                        rows[at, q] = inserted[k, q]
+                    theta[at] = theta[j] + t * (theta[moved[j + 1]] - theta[j])
+                    in_series[at] = in_series[j] and in_series[moved[j + 1]]
+                    frozen[at] = False
+                    open_[at] = True
+                    region[at] = region_of(bounds, p, inserted[k, S_L], inserted[k, S_Y])
+                    residual[at] = inserted[k, S_Y] - look_up(values, inserted[k, S_L], BASE)
+                    came_from[total + at] = above[j] + t * (above[j + 1] - above[j])
+                at -= 1
+                moved[j] = at
+                for q in range(5):
+                    rows[at, q] = rows[j, q]
+                theta[at], in_series[at], frozen[at] = theta[j], in_series[j], frozen[j]
+                open_[at], region[at], residual[at] = open_[j], region[j], residual[j]
+        for j in range(n):
+            came_from[total + moved[j]] = above[j]
+        for j in range(m):
+            for q in range(5):
+                states[total + j, q] = rows[j, q]
         first[row] = total
         # Zeros between trajectories at this depth.
-        new_b = np.empty(m)
-        edge = np.full(m, -1, np.int64)
-        for j in range(m):
-            new_b[j] = new[j, S_Y] - look_up(values, new[j, S_L], BASE)
-        zero_places = _grown(zero_places, n_zeros + 2 * m)
+        zeros = _grown(zeros, n_zeros + 2 * m)
         before = len(links)
         links = _grown(links, n_zeros + 2 * m)
         links[before:] = -1
-        for j in range(m - 1):
-            if new_open[j] and (new_b[j] >= 0.0) != (new_b[j + 1] >= 0.0):
-                zero_places[n_zeros, 0] = total + j
-                zero_places[n_zeros, 1] = total + j + 1
-                zero_places[n_zeros, 2] = new_b[j] / (new_b[j] - new_b[j + 1])
+        for j in range(m):
+            edge[j] = -1
+            if j + 1 < m and open_[j] and (residual[j] >= 0.0) != (residual[j + 1] >= 0.0):
+                zeros[n_zeros, 0] = total + j
+                zeros[n_zeros, 1] = total + j + 1
+                zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
                 edge[j] = n_zeros
                 n_zeros += 1
-                if _distance(new[j], new[j + 1], per_flux) > 2.0 * delta:
-                    unresolved = _grown(unresolved, n_unresolved + 1)
-                    unresolved[n_unresolved] = total + j
-                    n_unresolved += 1
         # Zeros along trajectories since the row before, and lines through the cells between the rows.
         if row > 0:
-            side = np.full(n, -1, np.int64)
             for j in range(n):
-                b_now = new_b[moved[j]]
-                if (old_b[j] >= 0.0) != (b_now >= 0.0):
-                    zero_places[n_zeros, 0] = above[j]
-                    zero_places[n_zeros, 1] = total + moved[j]
-                    zero_places[n_zeros, 2] = old_b[j] / (old_b[j] - b_now)
+                side[j] = -1
+                now = residual[moved[j]]
+                if (above_residual[j] >= 0.0) != (now >= 0.0):
+                    zeros[n_zeros, 0] = above[j]
+                    zeros[n_zeros, 1] = total + moved[j]
+                    zeros[n_zeros, 2] = above_residual[j] / (above_residual[j] - now)
                     side[j] = n_zeros
                     n_zeros += 1
             for j in range(n - 1):
-                if not old_open[j]:
+                if not open_[moved[j]]:
                     continue
                 count = 0
-                if old_edge[j] >= 0:
-                    cell_nodes[0] = old_edge[j]
-                    cell_places[0, 0] = zero_places[old_edge[j], 2]
+                if above_edge[j] >= 0:
+                    cell_nodes[0] = above_edge[j]
+                    cell_places[0, 0] = zeros[above_edge[j], 2]
                     cell_places[0, 1] = 0.0
                     count = 1
                 if side[j + 1] >= 0:
                     cell_nodes[count] = side[j + 1]
                     cell_places[count, 0] = 1.0
-                    cell_places[count, 1] = zero_places[side[j + 1], 2]
+                    cell_places[count, 1] = zeros[side[j + 1], 2]
                     count += 1
                 width = moved[j + 1] - moved[j]
                 for c in range(width - 1, -1, -1):
                     e = edge[moved[j] + c]
                     if e >= 0:
                         cell_nodes[count] = e
-                        cell_places[count, 0] = (c + zero_places[e, 2]) / width
+                        cell_places[count, 0] = (c + zeros[e, 2]) / width
                         cell_places[count, 1] = 1.0
                         count += 1
                 if side[j] >= 0:
                     cell_nodes[count] = side[j]
                     cell_places[count, 0] = 0.0
-                    cell_places[count, 1] = zero_places[side[j], 2]
+                    cell_places[count, 1] = zeros[side[j], 2]
                     count += 1
                 _match(cell_nodes, cell_places, count, links)
         # Close the curve where both ends of an interval lie in one invariant region, and drop what is closed in.
-        for j in range(m - 1):
-            if new_region[j] != FREE and new_region[j] == new_region[j + 1]:
-                new_open[j] = False
-        new_open[m - 1] = False
-        keep = 0
-        for j in range(m):
-            if (j > 0 and new_open[j - 1]) or new_open[j]:
-                keep += 1
-        current = np.empty((keep, 5))
-        theta = np.empty(keep)
-        in_series = np.empty(keep, np.bool_)
-        open_ = np.empty(keep, np.bool_)
-        region = np.empty(keep, np.int64)
-        frozen = np.empty(keep, np.bool_)
-        above = np.empty(keep, np.int64)
-        old_b = np.empty(keep)
-        old_edge = np.empty(keep, np.int64)
         at = 0
+        joined = False  # to the position before
         for j in range(m):
-            if (j > 0 and new_open[j - 1]) or new_open[j]:
-                current[at] = new[j]
-                theta[at] = new_theta[j]
-                in_series[at] = new_series[j]
-                open_[at] = new_open[j]
-                region[at] = new_region[j]
-                frozen[at] = new_frozen[j]
+            goes_on = j + 1 < m and open_[j] and not (region[j] != FREE and region[j] == region[j + 1])
+            if joined or goes_on:
+                if at < j:
+                    for q in range(5):
+                        rows[at, q] = rows[j, q]
+                    theta[at], in_series[at], frozen[at] = theta[j], in_series[j], frozen[j]
+                open_[at] = goes_on
                 above[at] = total + j
-                old_b[at] = new_b[j]
-                old_edge[at] = edge[j]
+                above_residual[at] = residual[j]
+                above_edge[at] = edge[j]
                 at += 1
-        old_open = open_.copy()
-        n = keep
+            joined = goes_on
+        n = at
         total += m
         first[row + 1] = total
         if n == 0:
@@ -509,9 +537,10 @@ def carry(
         states[:total],
         came_from[:total],
         first,
-        zero_places[:n_zeros],
+        zeros[:n_zeros],
         links[:n_zeros],
-        unresolved[:n_unresolved],
+        undecided[:n_undecided],
+        cells,
         status,
     )
 

@@ -58,13 +58,13 @@ class Refinement:
 REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
-_THIN, _THIN_STEP, _LEAST = 80, 0.25, 5e-10
+_THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
 
 
 @dataclass(frozen=True, eq=False)
 class RoughBranch:
     """The zeros of B along one branch of flows: their places (k,) among those of ``grid``, and their ``macroscopic``
-    quantities ln Q, ln h, ln M, ln T_surface (k, 4), to about 1e-3. ``closed`` where the last is next to the first."""
+    quantities ln Q, ln h, ln M, ln T_surface (k, 4), to about 1e-3. Where it is ``closed`` the last is the first."""
 
     grid: TrajectoryGrid
     zeros: Index
@@ -86,18 +86,22 @@ class TrajectoryGrid:
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
     curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
     row before, between two states where it was inserted. ``zeros`` (Z, 3) are the two states between which B vanishes,
-    and the fraction of the way. ``unresolved`` (U,) are states that are too far from their neighbour beside a zero.
+    and the fraction of the way. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the
+    first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or
+    they are too long.
     ``complete`` tells whether the curve was carried to the last depth.
     """
 
     model: Model
+    refinement: Refinement
     overburden: Array
     states: Array
     came_from: Array
     first: Index
     zeros: Array
     links: Index
-    unresolved: Index
+    cells: int
+    undecided: Index
     complete: bool
 
     @property
@@ -113,15 +117,22 @@ class TrajectoryGrid:
     @cached_property
     def macroscopic(self) -> Array:
         """ln Q, ln h, ln M, ln T_surface at the zeros, (Z, 4)."""
-        model = self.model
-        ends = self.zeros[:, :2].astype(np.int64)
-        state = self.states[ends]
-        over = self.overburden[self._rows(ends)]
+        values = self._quantities(self.zeros[:, :2].astype(np.int64))
+        return values[:, 0] + self.zeros[:, 2:] * (values[:, 1] - values[:, 0])
+
+    @cached_property
+    def hidden(self) -> Array:
+        """ln Q, ln h, ln M, ln T_surface of the flows that undecided cells may hide, roughly, (U, 4)."""
+        return self._quantities(self.undecided)
+
+    def _quantities(self, places: Index) -> Array:
+        """ln Q, ln h, ln M, ln T_surface of flows that had their base at states, (..., 4)."""
+        model, state = self.model, self.states[places]
+        over = self.overburden[self._rows(places)]
         f, _ = model.closures(np.exp(state[..., S_L]))
         root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
         flux = model.slip(f) * root_t * over + state[..., S_G]
-        values = np.stack([np.log(flux), np.log(state[..., S_H] / over), np.log(over), state[..., S_T]], axis=-1)
-        return values[:, 0] + self.zeros[:, 2:] * (values[:, 1] - values[:, 0])
+        return np.stack([np.log(flux), np.log(state[..., S_H] / over), np.log(over), state[..., S_T]], axis=-1)
 
     @cached_property
     def branches(self) -> tuple[RoughBranch, ...]:
@@ -131,6 +142,8 @@ class TrajectoryGrid:
         for begin, end in pairwise(starts.tolist()):
             zeros = order[begin:end]
             closed = bool(len(zeros) > 2 and self.links[zeros[0], 1] >= 0)
+            if closed:
+                zeros = np.append(zeros, zeros[0])
             found.append(RoughBranch(self, zeros, self.macroscopic[zeros], closed))
         return tuple(sorted(found, key=len, reverse=True))
 
@@ -172,12 +185,14 @@ def carry_down(
     overburden = _depths(model, t, coldest ** (1.0 / (1.0 + model.beta)), deepest, p_1, refinement.step)
     decades = np.log10(hottest / coldest)
     temperature = np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
-    states, came_from, first, zeros, links, unresolved, status = kernel.carry(
+    states, came_from, first, zeros, links, undecided, cells, status = kernel.carry(
         t.values, t.bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
         refinement.delta, 1.0 / t.scale, refinement.finest, refinement.most,
     )  # fmt: skip
-    return TrajectoryGrid(model, overburden, states, came_from, first, zeros, links, unresolved, status == kernel.DONE)
+    return TrajectoryGrid(
+        model, refinement, overburden, states, came_from, first, zeros, links, cells, undecided, status == kernel.DONE
+    )
 
 
 def _start_at_most(t: Tables) -> float:

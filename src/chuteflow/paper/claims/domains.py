@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from chuteflow import Chute, curve, flows, hot
-from chuteflow.analysis.domains import exists_at
+from chuteflow.maps import exists_at
 from chuteflow.paper.claims.cold import cold_slope_bounds
 from chuteflow.paper.claims.hot_flows import slope_of_lambda
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to

@@ -8,12 +8,12 @@ import math
 import numpy as np
 
 from chuteflow import Curve, Flow, flows, hot
-from chuteflow.analysis.domains import exists_at
-from chuteflow.analysis.ranges import DEEPEST
+from chuteflow.maps import exists_at
 from chuteflow.paper.claims.cold import cold_slope_bounds
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import GENTLE, SLOPE, STEEP, all_flows, count, curve_of, folds
 from chuteflow.paper.materials import dissipative
+from chuteflow.parameters import DEEPEST
 from chuteflow.theory.laws import law
 
 

@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 
 from chuteflow import Chute, Flow, HotModel, hot
-from chuteflow.analysis.hot import Shot, shoot
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import GENTLE, SLOPE, Array, hot_flow
 from chuteflow.paper.materials import dissipative, productive
+from chuteflow.steady.hot import Shot, shoot
 from chuteflow.theory.boundary import kappa
 from chuteflow.theory.hot import HotSolution, expansion, hot_solution, slope_at
 

@@ -24,7 +24,7 @@ from chuteflow.paper.claims.shared import (
 )
 from chuteflow.paper.materials import dissipative
 from chuteflow.steady.collocation import LOG_Q
-from chuteflow.steady.mapped import refine, solve_mapped
+from chuteflow.steady.mapped.solution import refine, solve_mapped
 from chuteflow.steady.solver import Condition
 from chuteflow.theory.boundary import INTERFACE_STRESS
 

@@ -12,7 +12,7 @@ from chuteflow import Flow
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import MASS_FLUX, flows_at, named_flows
 from chuteflow.steady.collocation import LOG_Q
-from chuteflow.steady.mapped import refine
+from chuteflow.steady.mapped.solution import refine
 from chuteflow.steady.solver import Condition
 
 #: The numbers in the caption of figure 2, and the flows' names there.

@@ -1,0 +1,107 @@
+"""What lies between boundaries: how many flows, of which kind, and where the range searched ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
+from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion
+from chuteflow.bifurcations.points import BoundaryPoint, solved
+from chuteflow.bifurcations.seeds import FOLDS, HELD
+from chuteflow.bifurcations.system import BoundarySystem, Sweep
+from chuteflow.bifurcations.tracing import TracedBoundary, traced
+from chuteflow.branches.enumeration import flows
+from chuteflow.branches.families import TracedFamily
+from chuteflow.branches.ranges import Range
+from chuteflow.errors import InputError
+from chuteflow.numerics.newton import solve_each
+from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.steady.model import IMAGINARY_STEP
+from chuteflow.steady.solver import Solution
+
+#: The argument of :func:`chuteflow.flows` that holds the quantity which folds.
+_ARGUMENTS = {"fold-Q": "Q", "fold-M": "M", "fold-T": "T_surface"}
+#: A family ends at an edge of the range if it comes as near to it in the logarithm.
+_AT_EDGE = 1e-6
+#: A limit of the range is followed as far beyond it as this factor, for it to be inside.
+_BEYOND = 10.0
+
+
+def count(found: BoundarySet, value: float, quantity: float) -> int:
+    """How many flows there are in the range searched at a ``value`` of the second parameter, which share one value
+    of the quantity whose folds ``found`` are.
+
+    Raises:
+        InputError: where they are no folds, or for numbers out of bounds.
+        SolveError: where a flow could not be solved.
+    """
+    if found.kind not in FOLDS:
+        raise InputError(f"boundaries of the kind {found.kind!r} do not bound numbers of flows: {', '.join(FOLDS)} do")
+    which: dict[str, Any] = {_ARGUMENTS[found.kind]: quantity}
+    searched = found.searched
+    chute = replace(found.chute, **{found.second: value})
+    ranges: dict[str, Any] = {
+        "surface_temperature": searched.surface_temperature,
+        "largest_holdup": searched.largest_holdup,
+    }
+    return len(flows(chute, **which, **ranges))
+
+
+def limits(found: BoundarySet) -> list[Boundary]:
+    """The edges of the range searched, as far as families of flows end there: the flows of the largest and smallest
+    surface temperature and of the largest hold-up, followed through the second parameter.
+
+    Raises:
+        SolveError: where one could not be followed.
+    """
+    sweep = Sweep(found.chute, found.second, *found.bounds)
+    within = Range.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
+    edges = (
+        (Held(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
+        (Held(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
+        (Held(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
+    )
+    out: list[Boundary] = []
+    for condition, wider in edges:
+        lines: list[TracedBoundary] = []
+        for value, families in zip(found.sampled, found.families, strict=True):
+            for solution in _ends(families, condition):
+                w = np.append(solution.z, value)
+                system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+                point = solved(system, w, HELD, value, found.tolerance)
+                if not any(line.holds(point) for line in lines):
+                    lines.append(traced(point, wider, found.tolerance))
+        out += [as_boundary("limit", found.second, line) for line in lines]
+    return out
+
+
+def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solution]:
+    for family in families:
+        for solution in (family.solutions[0], family.solutions[-1]):
+            if abs(float(solution.macroscopic[condition.which]) - condition.value) < _AT_EDGE:
+                yield solution
+
+
+def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
+    """The kinds of the flows at smaller and at larger values of the second parameter, beside point ``index`` of a
+    boundary, with the quantity ``which`` held; None for folds, and where that quantity has a fold itself."""
+    point: BoundaryPoint = boundary.traced.points[index]
+    condition = point.system.condition
+    if isinstance(condition, Inversion):
+        kinds = ("monotonic", "inverted")
+    elif isinstance(condition, InteriorChange):
+        kinds = ("productive", "mixed") if condition.largest else ("mixed", "dissipative")
+    else:
+        return None
+    at = point.system.local(point.w)
+    matrix = np.concatenate([at.by_z, at.state.macroscopic_gradient()[which][None]])
+    moved = np.append(at.by_parameter, at.stepped.macroscopic()[which].imag / IMAGINARY_STEP)
+    _, by_z, by_parameter = condition(at)
+    rate = by_parameter - float(by_z @ solve_each(matrix, moved))
+    if not np.isfinite(rate):
+        return None
+    return kinds if rate > 0.0 else (kinds[1], kinds[0])

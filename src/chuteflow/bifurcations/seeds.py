@@ -1,0 +1,319 @@
+"""Where boundaries are entered: their points on the families of flows at one value of the second parameter.
+
+# notation: sigma runs from 0 to 1 along the chord between two successive flows of a family in the plane
+# (ln M, ln T_surface).
+
+A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
+either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
+from the ends of families, the parameter is moved until the condition holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion, Local
+from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
+from chuteflow.bifurcations.system import BoundarySystem, Sweep
+from chuteflow.branches.families import TracedFamily, traced_families
+from chuteflow.branches.paths import solve_between
+from chuteflow.branches.ranges import Range
+from chuteflow.errors import SolveError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.newton import solve_each
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
+from chuteflow.steady.model import LOSS, WORK, model
+from chuteflow.steady.solver import Condition as SolverCondition
+from chuteflow.steady.solver import Solution, resolve
+
+#: The kinds of boundaries, and the quantities whose folds they are.
+FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
+KINDS = (*FOLDS, "density-inversion", "interior-change")
+#: The row that holds the parameter.
+HELD = np.array([0.0, 0.0, 1.0])
+#: A point is looked for this far beyond a chord, and found within so many of its lengths beside it.
+_BEYOND, _BESIDE = 0.02, 1.0
+#: How often a stretch is halved where the point that it must hold is not found.
+_HALVINGS = 6
+#: A boundary beside the families is looked for as far as so many times the distance to go to it.
+_FARTHER = 1.5
+#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a share is left.
+_STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+#: A condition that no flow enters is met at values of the parameter known to this.
+_CLOSE = 1e-14
+#: Net loss below this is none.
+_NONE = 1e-10
+#: Range of ln x over which the least is looked for, samples of it, and how often it is zoomed in.
+_LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """A flow of a family, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
+    plane (ln M, ln T_surface), (2, n+3), and the Jacobian of the steady problem."""
+
+    solution: Solution
+    value: float
+    gradient: Array
+    plane: Array
+    jacobian: Array
+
+    def slope(self, chord: Array) -> float:
+        """Derivative of the function with respect to sigma, along a chord (2,)."""
+        matrix = np.concatenate([self.jacobian, (chord @ self.plane / (chord @ chord))[None]])
+        side = np.zeros(len(matrix))
+        side[-1] = 1.0
+        return float(self.gradient @ solve_each(matrix, side))
+
+
+def conditions(kind: str) -> Sequence[Condition]:
+    """The conditions of a kind of boundary."""
+    if kind in FOLDS:
+        return [Fold(FOLDS[kind])]
+    return [Inversion()] if kind == "density-inversion" else [InteriorChange(False), InteriorChange(True)]
+
+
+def on_families(
+    sweep: Sweep,
+    condition: Condition,
+    value: float,
+    families: Sequence[TracedFamily],
+    reach: float,
+    tolerance: float,
+) -> Iterator[BoundaryPoint]:
+    """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
+    far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
+    for family in families:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+        if isinstance(condition, Fold):
+            for turn in family.turns(condition.which, tolerance):
+                if turn.point.solution.problem.breaks == WHOLE:
+                    yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
+        else:
+            yield from _zeros(sweep, condition, value, samples, tolerance)
+        for i, chord in _nearest(samples, condition):
+            point = _beside(sweep, condition, value, samples[i].solution, chord, reach, tolerance)
+            if point is not None:
+                yield point
+
+
+def _in_one_piece(family: TracedFamily) -> list[Solution]:
+    """The flows of a family that one grid resolves: boundaries are followed on such."""
+    return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
+
+
+def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
+    """Every family of flows in a range at one value of the parameter."""
+    return traced_families(model(sweep.chute_at(value)), within)
+
+
+def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
+    """The point of the boundary at a value of the parameter, from its flow."""
+    w = np.append(solution.z, value)
+    system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+    return solved(system, w, HELD, value, tolerance)
+
+
+def _zeros(
+    sweep: Sweep, condition: Condition, value: float, samples: Sequence[_Sample], tolerance: float
+) -> list[BoundaryPoint]:
+    """The points along a family where the condition's function vanishes."""
+    found: list[BoundaryPoint] = []
+    for first, last in pairwise(samples):
+        for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
+            if not any(_same(point, other) for other in found):
+                found.append(point)
+    return found
+
+
+def _between(
+    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, tolerance: float, halvings: int
+) -> Iterator[BoundaryPoint]:
+    """The points between two flows: as the cubic through both says, or those in both halves."""
+    chord = (last.solution.macroscopic - first.solution.macroscopic)[LOG_M:]
+    if not chord.any():
+        return
+    needed = (first.value > 0.0) != (last.value > 0.0)
+    places = _places(first.value, last.value, first.slope(chord), last.slope(chord))
+    if not needed and not places:
+        return
+    found = [p for p in (_near(sweep, condition, value, first, last, s, tolerance) for s in places) if p is not None]
+    found = [p for i, p in enumerate(found) if not any(_same(p, q) for q in found[:i])]
+    if (len(found) % 2 == 1) == needed and len(found) == len(places):
+        yield from found
+    elif halvings:
+        middle = _sample(sweep, condition, value, solve_between(first.solution, last.solution, 0.5))
+        yield from _between(sweep, condition, value, first, middle, tolerance, halvings - 1)
+        yield from _between(sweep, condition, value, middle, last, tolerance, halvings - 1)
+    elif needed:
+        raise SolveError("a point of a boundary was seen but not solved: narrow the range searched")
+
+
+def _places(f0: float, f1: float, d0: float, d1: float) -> list[float]:
+    """Where the cubic with these end values and slopes on [0, 1] vanishes, about in between."""
+    cubic = np.array([2.0 * (f0 - f1) + d0 + d1, 3.0 * (f1 - f0) - 2.0 * d0 - d1, d0, f0])
+    if not np.isfinite(cubic).all():
+        return []
+    roots = np.roots(cubic)
+    real = roots[np.abs(roots.imag) <= 1e-12].real
+    return sorted(np.clip(real[(real > -_BEYOND) & (real < 1.0 + _BEYOND)], 0.0, 1.0).tolist())
+
+
+def _near(
+    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, sigma: float, tolerance: float
+) -> BoundaryPoint | None:
+    """The point near ``sigma`` of a chord, if there is one."""
+    one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
+    share = 1.0 - sigma if one is last.solution else sigma
+    problem = one.problem
+    _, matrix = other.problem.transferred(problem.degree, problem.stretch)
+    moved = np.concatenate([matrix @ other.z[:-2], other.z[-2:]])
+    w = np.append(one.z + share * (moved - one.z), value)
+    system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
+    try:
+        point = solved(system, w, HELD, value, tolerance)
+    except SolveError:
+        return None
+    ends = np.array([s.solution.macroscopic[LOG_M:] for s in (first, last)])
+    here = point.flow.solution.macroscopic[LOG_M:]
+    chord = ends[1] - ends[0]
+    length = float(np.hypot(*chord))
+    along = float((here - ends[0]) @ chord) / length
+    beside = float(np.hypot(*(here - ends[0] - along / length * chord)))
+    inside = -_BEYOND * length <= along <= (1.0 + _BEYOND) * length
+    return point if inside and beside <= _BESIDE * length else None
+
+
+def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple[int, Array]]:
+    """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
+    plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
+    chords = np.diff(plane, axis=0)
+    if len(samples) < 3 or not chords.any(axis=1).all():
+        return
+    chords = np.concatenate([chords, chords[-1:]])
+    if condition.turns:
+        f = np.array([s.slope(c) / np.hypot(*c) for s, c in zip(samples, chords, strict=True)])
+    else:
+        f = np.array([sample.value for sample in samples])
+    size = np.abs(f)
+    for i in range(len(f)):
+        beside = [j for j in (i - 1, i + 1) if 0 <= j < len(f)]
+        if all(size[i] <= size[j] and f[i] * f[j] > 0.0 for j in beside):
+            yield i, chords[i]
+
+
+def _beside(
+    sweep: Sweep,
+    condition: Condition,
+    value: float,
+    solution: Solution,
+    chord: Array,
+    reach: float,
+    tolerance: float,
+) -> BoundaryPoint | None:
+    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
+    row = np.array([chord[1], chord[0], 0.0])
+    plane = SolverCondition.plane(chord, solution.macroscopic)
+    at = value
+    for _ in range(_WALK):
+        w = np.append(solution.z, at)
+        system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+        ahead = at + shift(system, w, row)
+        if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
+            return None
+        if abs(ahead - at) <= _ARRIVED * reach:
+            break
+        at += float(np.clip(ahead - at, -_STRIDE * reach, _STRIDE * reach))
+        moved = replace(solution.problem, model=sweep.models(at)[0])
+        solution = resolve(replace(solution, source=(moved, solution.z)), plane, _ROUGH)
+        if not solution.converged:
+            return None
+    else:
+        return None
+    try:
+        point = solved(system, w, row, float(row @ w[-3:]), tolerance)
+    except SolveError:
+        return None
+    near = abs(point.value - value) <= _FARTHER * reach and sweep.low <= point.value <= sweep.high
+    return point if near else None
+
+
+def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
+    gap = p.flow.solution.macroscopic - q.flow.solution.macroscopic
+    return bool(np.abs(gap).max() < 1e-7)
+
+
+def _sample(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> _Sample:
+    here, beyond = sweep.models(value)
+    degree, stretch = solution.problem.degree, solution.problem.stretch
+    at = Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
+    f, gradient = condition.along_family(at)
+    return _Sample(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
+
+
+def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: float) -> list[float]:
+    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole families.
+
+    On the half-line dissipation and production balance at the surface, or at the density where they come nearest
+    to it, in all flows of a chute that have that density or in none.
+    """
+    if not isinstance(condition, InteriorChange) or sweep.chute.surface != "free":
+        return []
+    out = []
+    for balance in (_at_surface, _least):
+        ends = balance(sweep, low), balance(sweep, high)
+        if (ends[0] > 0.0) != (ends[1] > 0.0):
+            out.append(_root(partial(balance, sweep), low, high, ends[0] > 0.0))
+    return out
+
+
+def along_families(
+    sweep: Sweep, condition: Condition, value: float, families: Sequence[TracedFamily], tolerance: float
+) -> Iterator[BoundaryPoint]:
+    """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
+    for family in families:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+        met = np.array([abs(sample.value) < _NONE for sample in samples])
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            solution = samples[(begin + end) // 2].solution
+            w = np.append(solution.z, value)
+            system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+            yield through(system, w, tolerance)
+
+
+def _at_surface(sweep: Sweep, value: float) -> float:
+    """Net loss at the surface of the half-line."""
+    here, _ = sweep.models(value)
+    f, _ = here.closures(np.zeros(1))
+    return float(f[LOSS, 0] - here.slope**2 * f[WORK, 0])
+
+
+def _least(sweep: Sweep, value: float) -> float:
+    """The least net loss at any density."""
+    here, _ = sweep.models(value)
+    (low, high), least = _LOG_X, np.inf
+    for _ in range(_ZOOMS):
+        log_x = np.linspace(low, high, _SAMPLES)
+        f, _ = here.closures(np.exp(log_x))
+        net = f[LOSS] - here.slope**2 * f[WORK]
+        k = int(np.argmin(net))
+        least = float(net[k])
+        low, high = log_x[max(k - 1, 0)], log_x[min(k + 1, _SAMPLES - 1)]
+    return least
+
+
+def _root(function: Callable[[float], float], low: float, high: float, falling: bool) -> float:
+    """Where a function changes sign once, by bisection to rounding."""
+    while high - low > _CLOSE * high:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (middle, high) if (function(middle) > 0.0) == falling else (low, middle)
+    return 0.5 * (low + high)

@@ -1,0 +1,153 @@
+"""A boundary in one parameter more as a continuation problem.
+
+# notation: z unknowns of a flow (n+3,), lambda the second parameter.
+
+Unknowns (z, lambda); equations: the steady problem and one condition. Turning points in lambda are nothing
+special to the continuation of :mod:`chuteflow.numerics.continuation`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from chuteflow.bifurcations.conditions import Condition, Local
+from chuteflow.numerics.chebyshev import Array, tail
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import Collocation
+from chuteflow.steady.elements import DEGREES
+from chuteflow.steady.model import Model, model_along
+from chuteflow.steady.solver import default_stretch
+from chuteflow.theory.constitutive import Law
+
+#: Length, in the plane of ln T_surface and ln M, that counts as much as the whole range of the parameter.
+_SPAN = 6.0
+#: Weight of the gradient of the potential in the inner product.
+_OF_GRADIENT = 0.02
+#: Decay of the coefficients between which a grid is kept along a boundary.
+_RESOLVED, _WASTED = 1e-7, 1e-13
+#: The stretch is renewed when it is off by more.
+_STRETCH_OFF = 0.3
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The second parameter of a chute: its ``name`` in Chute, and the range ``low`` to ``high``."""
+
+    chute: Chute
+    name: str
+    low: float
+    high: float
+
+    @property
+    def weight(self) -> float:
+        """Of the parameter in the inner product."""
+        return (_SPAN / (self.high - self.low)) ** 2
+
+    def models(self, value: float) -> tuple[Model, Model]:
+        """The problem at a value of the parameter, and an imaginary step further."""
+        return _models(self, self.chute.law, value)
+
+    def chute_at(self, value: float) -> Chute:
+        """The chute at a value of the parameter, which may be beyond the range by rounding."""
+        return replace(self.chute, **{self.name: min(max(value, self.low), self.high)})
+
+    def allows(self, value: float) -> bool:
+        """Whether the equations are asked for: within the range, or a little beyond it."""
+        margin = min(0.1 * (self.high - self.low), 0.5 * self.low if self.low > 0.0 else np.inf)
+        return self.low - margin <= value <= self.high + margin
+
+
+@lru_cache(maxsize=4)
+def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
+    del registered  # known here to tell what is remembered of one law from that of another
+    return model_along(sweep.chute, sweep.name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySystem:
+    """The steady problem and one condition, on a grid of ``degree`` and ``stretch``; unknowns (z, lambda).
+
+    The inner product is that of the plane (theta at the surface, ln M), with a little of the integral of g^2 over the
+    overburden, so that neither resolution nor stretch changes the path, and with the parameter, whose range counts as
+    much as a factor of e^6 in T_surface or M.
+    """
+
+    sweep: Sweep
+    condition: Condition
+    degree: int
+    stretch: float
+
+    @property
+    def weights(self) -> Array:
+        """Of the unknowns, (n+4,)."""
+        problem = self.problem(self.sweep.low)
+        by_quadrature = problem.grid.weights * problem.share[1]
+        return np.concatenate([_OF_GRADIENT * by_quadrature, [1.0, 1.0, self.sweep.weight]])
+
+    def problem(self, value: float) -> Collocation:
+        """The steady problem at a value of the parameter."""
+        return Collocation(self.sweep.models(value)[0], self.degree, self.stretch)
+
+    def local(self, w: Array) -> Local:
+        """Everything at the unknowns ``w`` (n+4,)."""
+        here, beyond = self.sweep.models(float(w[-1]))
+        stepped = Collocation(beyond, self.degree, self.stretch)
+        return Local.at(Collocation(here, self.degree, self.stretch), stepped, w[:-1])
+
+    def residual_and_jacobian(self, w: Array) -> tuple[Array, Array]:
+        """See chuteflow.numerics.continuation.System."""
+        n = len(w) - 1
+        residual, jacobian = np.full(n, np.nan), np.full((n, n + 1), np.nan)
+        if not self.sweep.allows(float(w[-1])):
+            return residual, jacobian
+        # A trial that goes too far may overflow; the continuation finds that out.
+        with np.errstate(all="ignore"):
+            at = self.local(w)
+            residual[:-1], jacobian[:-1, :-1], jacobian[:-1, -1] = at.residual, at.by_z, at.by_parameter
+            residual[-1], jacobian[-1, :-1], jacobian[-1, -1] = self.condition(at)
+        return residual, jacobian
+
+    def adapted(self, w: Array, tangent: Array) -> tuple[BoundarySystem, Array, Array] | None:
+        """Another grid or stretch where the flow asks for it, and other borders where the condition does."""
+        other = _suited(self.problem(float(w[-1])), w[:-1])
+        if other is None:
+            at = self.local(w)
+            if self.condition.suits(at):
+                return None
+            return replace(self, condition=self.condition.based(at)), w, tangent
+        problem, matrix = other
+        moved, direction = (np.concatenate([matrix @ v[:-3], v[-3:]]) for v in (w, tangent))
+        return self.moved(problem, moved), moved, direction
+
+    def moved(self, problem: Collocation, w: Array) -> BoundarySystem:
+        """The system on the grid of ``problem``, where ``w`` is about the solution."""
+        other = replace(self, degree=problem.degree, stretch=float(np.reshape(problem.stretch, ())))
+        return replace(other, condition=self.condition.based(other.local(w)))
+
+    def tangent(self, w: Array) -> Array:
+        """The null vector (n+4,) of the Jacobian, of length 1 in the inner product."""
+        _, jacobian = self.residual_and_jacobian(w)
+        # Columns are scaled so that the null vector is that of the inner product.
+        root = np.sqrt(np.maximum(self.weights, 1e-12))
+        _, _, v = np.linalg.svd(jacobian / root)
+        return v[-1] / root
+
+
+def _suited(problem: Collocation, z: Array) -> tuple[Collocation, Array] | None:
+    """A finer or coarser grid, or another stretch, where the flow asks for it, with the matrix that takes g to it."""
+    state = problem.state(z)
+    decay = tail(problem.grid, state.y + 1e-30)
+    place = DEGREES.index(problem.degree)
+    if decay > _RESOLVED and place + 1 < len(DEGREES):
+        place += 1
+    elif decay < _WASTED and place > 0:
+        place -= 1
+    stretch = default_stretch(problem.model, float(state.mass[0]), float(np.exp(state.log_t[0])))
+    if abs(stretch - problem.stretch) < _STRETCH_OFF:
+        if DEGREES[place] == problem.degree:
+            return None
+        stretch = problem.stretch
+    return problem.transferred(DEGREES[place], stretch)

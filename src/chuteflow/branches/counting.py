@@ -1,0 +1,58 @@
+"""How many flows share one mass flux, as far as the branches of a curve tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from chuteflow.branches.ranges import goes_on
+from chuteflow.branches.results import Branch, Curve
+
+
+@dataclass(frozen=True)
+class Count:
+    """So many ``flows`` at every mass flux from ``low`` to ``high``; ``at_least`` so many where a branch leaves the
+    range searched, or is lost, on its way to these fluxes. ``low`` may be 0, and ``high`` infinite."""
+
+    low: float
+    high: float
+    flows: int
+    at_least: bool
+
+
+def flux_counts(curve: Curve) -> list[Count]:
+    """The numbers of flows that share one mass flux, from the smallest flux to the largest, without gaps.
+
+    Their edges are the folds and the ends of the branches.
+    """
+    stretches = [stretch for branch in curve.branches for stretch in _monotonic(branch)]
+    rays = [ray for branch in curve.branches for ray in _beyond(branch)]
+    edges = sorted({0.0, np.inf, *(edge for stretch in stretches for edge in stretch)})
+    counts: list[Count] = []
+    for low, high in pairwise(edges):
+        flows = sum(first <= low and high <= last for first, last in stretches)
+        at_least = any(first <= low and high <= last for first, last in rays)
+        if counts and (counts[-1].flows, counts[-1].at_least) == (flows, at_least):
+            low = counts.pop().low
+        counts.append(Count(low, high, flows, at_least))
+    return counts
+
+
+def _monotonic(branch: Branch) -> list[tuple[float, float]]:
+    """Lowest and highest mass flux of the stretches of a branch between its folds."""
+    stops = _stops(branch)
+    return [(min(pair), max(pair)) for pair in pairwise(stops)]
+
+
+def _beyond(branch: Branch) -> list[tuple[float, float]]:
+    """Lowest and highest mass flux to which a branch may go on beyond its ends."""
+    stops = _stops(branch)
+    ends = ((stops[1], stops[0], branch.ends[0]), (stops[-2], stops[-1], branch.ends[1]))
+    return [(end, np.inf) if end > before else (0.0, end) for before, end, words in ends if goes_on(words)]
+
+
+def _stops(branch: Branch) -> list[float]:
+    turns = [point.flow.mass_flux for point in branch.special if point.kind == "fold-Q"]
+    return [branch.flows[0].mass_flux, *turns, branch.flows[-1].mass_flux]

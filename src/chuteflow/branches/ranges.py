@@ -1,0 +1,103 @@
+"""The range of surface temperatures and hold-ups that is searched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chuteflow.checks import number, pair
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import DEEPEST, SHALLOWEST, WIDEST
+from chuteflow.steady.collocation import LOG_M, LOG_T
+
+#: Why a branch ends for good, in words.
+VANISHES, CLOSED = "its hold-up vanishes", "the branch closes on itself"
+#: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
+_NEAR, _ROUNDING = 0.3, 1e-9
+
+
+@dataclass(frozen=True)
+class Range:
+    """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
+
+    A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
+    proportion to their temperature, and no family ends so.
+    """
+
+    coldest: float
+    hottest: float
+    deepest: float
+    shallowest: float
+
+    @classmethod
+    def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
+        """The range given.
+
+        Raises:
+            InputError: if it is empty or beyond what can be searched.
+        """
+        low, high = pair("surface_temperature", surface_temperature)
+        largest_holdup = number("largest_holdup", largest_holdup)
+        if not WIDEST[0] <= low < high <= WIDEST[1]:
+            raise InputError(
+                f"surface temperatures from {low:g} to {high:g}: must rise, within {WIDEST[0]:g} to {WIDEST[1]:g}"
+            )
+        if not SHALLOWEST <= largest_holdup <= DEEPEST:
+            raise InputError(f"largest hold-up {largest_holdup:g}: must be from {SHALLOWEST:g} to {DEEPEST:g}")
+        return cls(low, high, largest_holdup, SHALLOWEST if surface == "interface" else 0.0)
+
+    def reaching(self, axis: int, value: float) -> Range:
+        """The range widened, as far as allowed, to ``value`` of the surface temperature or hold-up."""
+        if axis == LOG_M:
+            return replace(self, deepest=min(max(self.deepest, value), DEEPEST))
+        return replace(
+            self,
+            coldest=max(min(self.coldest, value), WIDEST[0]),
+            hottest=min(max(self.hottest, value), WIDEST[1]),
+        )
+
+    def contains(self, macroscopic: Array, margin: float = _ROUNDING) -> bool:
+        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, give or take ``margin``."""
+        return bool(
+            np.log(self.coldest) - margin <= macroscopic[LOG_T] <= np.log(self.hottest) + margin
+            and macroscopic[LOG_M] <= np.log(self.deepest) + margin
+            and (self.shallowest == 0.0 or macroscopic[LOG_M] >= np.log(self.shallowest) - margin)
+        )
+
+    def edge(self, macroscopic: Array, axis: int) -> int:
+        """-1 or 1 where a flow lies at the lower or upper edge of LOG_T, 1 at the edge of LOG_M, else 0."""
+        if axis == LOG_T and macroscopic[LOG_T] < np.log(self.coldest) + _NEAR:
+            return -1
+        upper = self.hottest if axis == LOG_T else self.deepest
+        return int(macroscopic[axis] > np.log(upper) - _NEAR)
+
+    def at_edge(self, macroscopic: Array, near: float) -> tuple[int, float] | None:
+        """The edge at which a flow lies to within ``near``: LOG_T or LOG_M, and its value there."""
+        edges = [(LOG_M, self.deepest), (LOG_T, self.hottest), (LOG_T, self.coldest)]
+        if self.shallowest > 0.0:
+            edges.append((LOG_M, self.shallowest))
+        for axis, value in edges:
+            if abs(float(macroscopic[axis]) - np.log(value)) < near:
+                return axis, float(np.log(value))
+        return None
+
+    def end_words(self, macroscopic: Array) -> str:
+        """Why a branch ends at a flow."""
+        edge = self.at_edge(macroscopic, _NEAR)
+        if edge is None:
+            return "the search was not carried further"
+        axis, value = edge
+        if axis == LOG_M:
+            if value == np.log(self.deepest):
+                return f"it goes on to hold-ups above {self.deepest:g}"
+            return VANISHES
+        if value == np.log(self.hottest):
+            return f"it goes on to surface temperatures above {self.hottest:g}"
+        return f"it goes on to surface temperatures below {self.coldest:g}"
+
+
+def goes_on(words: str) -> bool:
+    """Whether a branch that ends with these words may have more flows beyond: it leaves the range, or is lost."""
+    return words not in (VANISHES, CLOSED)

@@ -1,0 +1,183 @@
+"""What the analyses return: sets of flows, branches of a curve, special points, the range searched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+
+from chuteflow import display
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, PLACE
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What the grid of trajectories looked at: neighbours are at most ``delta`` apart; of ``number`` cells between them
+    so many are ``undecided``: they may hide flows."""
+
+    delta: float
+    number: int
+    undecided: int
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` looked at, where they
+    were counted."""
+
+    surface_temperature: tuple[float, float]
+    largest_holdup: float
+    cells: Cells | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FlowSet(Sequence[Flow]):
+    """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
+
+    ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
+    ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where there
+    may be more: where a branch leaves the range searched towards what was asked for, a flow that was seen could not be
+    solved, or the search does not tell; None otherwise.
+    """
+
+    chute: Chute
+    flows: tuple[Flow, ...]
+    searched: Searched
+    tolerance: float
+    reason: str | None
+    incomplete: str | None = None
+
+    def __repr__(self) -> str:
+        warmth = display.listed([flow.surface_temperature for flow in self.flows])
+        found = f"T_surface = {warmth}" if self.flows else self.reason
+        return display.line("FlowSet", display.counted(len(self), "flow"), found)
+
+    def _repr_html_(self) -> str:
+        header = ["", "name", *(NUMBERS[name].symbol for name in PLACE), "density", "interior", "validity", "error"]
+        rows = [
+            [
+                *(str(i), flow.name, *_place(flow), flow.density, flow.interior),
+                *(flow.validity.summary, f"{flow.error:.0e}"),
+            ]
+            for i, flow in enumerate(self, 1)
+        ]
+        return display.html_table(f"{display.counted(len(self), 'flow')} on {self.chute}", header, rows, self.reason)
+
+    def __len__(self) -> int:
+        return len(self.flows)
+
+    @overload
+    def __getitem__(self, index: int) -> Flow: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Flow]: ...
+    def __getitem__(self, index: int | slice) -> Flow | Sequence[Flow]:
+        return self.flows[index]
+
+    def __iter__(self) -> Iterator[Flow]:
+        return iter(self.flows)
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A located point of a branch: ``kind`` is one of KINDS, ``position`` the index just before it."""
+
+    kind: str
+    flow: Flow
+    position: int
+
+    def __repr__(self) -> str:
+        numbers = {NUMBERS[name].symbol: getattr(self.flow, name) for name in PLACE}
+        return display.line("SpecialPoint", self.kind, **numbers)
+
+
+#: Kinds of special points, and what they are.
+KINDS = {
+    "fold-Q": "two flows of one mass flux meet",
+    "fold-M": "two flows of one hold-up meet",
+    "fold-T": "two flows of one surface temperature meet",
+    "density-inversion": "onset of a volume fraction that rises with height",
+    "interior-change": "the interior changes between dissipative, mixed and productive",
+    "stability-change": "small disturbances begin to grow, or cease to",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """One family of flows in order along its curve; ``ends`` says in words why it ends at either side."""
+
+    flows: tuple[Flow, ...]
+    special: tuple[SpecialPoint, ...]
+    ends: tuple[str, str]
+
+    def __repr__(self) -> str:
+        found = display.counted(len(self.special), "special point")
+        reach = (display.span("Q", self.mass_flux), display.span("T_surface", self.surface_temperature))
+        return display.line("Branch", f"{display.counted(len(self.flows), 'flow')}, {found}", *reach)
+
+    def _repr_html_(self) -> str:
+        return display.html_table(repr(self)[1:-1], ["", *(NUMBERS[name].symbol for name in PLACE)], _stations(self))
+
+    @cached_property
+    def mass_flux(self) -> Array:
+        """Q along the branch."""
+        return np.array([flow.mass_flux for flow in self.flows])
+
+    @cached_property
+    def centre_of_mass(self) -> Array:
+        """h along the branch."""
+        return np.array([flow.centre_of_mass for flow in self.flows])
+
+    @cached_property
+    def mass_holdup(self) -> Array:
+        """M along the branch."""
+        return np.array([flow.mass_holdup for flow in self.flows])
+
+    @cached_property
+    def surface_temperature(self) -> Array:
+        """T_surface along the branch."""
+        return np.array([flow.surface_temperature for flow in self.flows])
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """All families of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
+    where there may be more: where a family was seen and not solved, or the search does not tell."""
+
+    chute: Chute
+    branches: tuple[Branch, ...]
+    searched: Searched
+    tolerance: float
+    reason: str | None
+    incomplete: str | None = None
+
+    def __repr__(self) -> str:
+        families = display.counted(len(self.branches), "family", "families")
+        total = display.counted(sum(len(branch.flows) for branch in self.branches), "flow")
+        reach = [
+            display.span(NUMBERS[name].symbol, np.concatenate([getattr(branch, name) for branch in self.branches]))
+            for name in ("mass_flux", "surface_temperature")
+            if self.branches
+        ]
+        return display.line("Curve", f"{families}, {total}", *reach, self.reason)
+
+    def _repr_html_(self) -> str:
+        header = ["family", "", *(NUMBERS[name].symbol for name in PLACE)]
+        rows = [[str(i), *row] for i, branch in enumerate(self.branches, 1) for row in _stations(branch)]
+        families = display.counted(len(self.branches), "family", "families")
+        return display.html_table(f"{families} of flows on {self.chute}", header, rows, self.reason)
+
+
+def _place(flow: Flow) -> list[str]:
+    return [display.number(getattr(flow, name)) for name in PLACE]
+
+
+def _stations(branch: Branch) -> list[list[str]]:
+    """Where a branch begins and ends, and its special points, as rows of cells."""
+    between = [[point.kind, *_place(point.flow)] for point in branch.special]
+    return [["begins", *_place(branch.flows[0])], *between, ["ends", *_place(branch.flows[-1])]]

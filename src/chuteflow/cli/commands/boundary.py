@@ -1,0 +1,169 @@
+"""``chuteflow boundary``: folds and other special points, followed through a second parameter."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
+from chuteflow.steady.quantities import NUMBERS, PLACE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.bifurcations.boundary import Boundary, BoundarySet
+
+#: The numbers that can stand on the vertical axis, by their symbols.
+_UPRIGHT = {NUMBERS[name].symbol: name for name in PLACE}
+_EPILOG = (
+    "Example: chuteflow boundary --of fold-Q --in slope,Q --slope 0.2:0.45 --e 0.8 --ew 0.8 --roughness 0.6"
+    " --plot folds.png"
+)
+
+
+class Plane(click.ParamType):
+    """The second parameter and the number on the vertical axis."""
+
+    name = "parameter,quantity"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        """Both names."""
+        names = [name.strip() for name in str(value).split(",")]
+        if len(names) != 2 or names[0] not in BY_KEY or names[1] not in _UPRIGHT:
+            self.fail(
+                f"{value!r}: write one of {', '.join(BY_KEY)}, a comma and one of {', '.join(_UPRIGHT)}, "
+                "for example slope,Q",
+                param,
+                ctx,
+            )
+        return names[0], names[1]
+
+
+@click.command("boundary", help=COMMANDS["boundary"], epilog=_EPILOG)
+@options.option(
+    "--of",
+    metavar="KIND",
+    help="What to follow: fold-Q (the default), fold-M, fold-T, density-inversion or interior-change.",
+)
+@options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
+@options.range_options("where it is the second parameter")
+@options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
+@options.closure_options
+@options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
+@options.search_options
+@options.output_options
+def command(**given: Any) -> None:
+    """Follow, print, save and draw."""
+    second, upright = given["plane"] or ("slope", "Q")
+    bounds, chute = _chute(given, second)
+    options.require_outputs(given)
+    from chuteflow.bifurcations.boundary import boundary
+
+    chosen = {name: given[option] for name, option in (("of", "of"), ("samples", "samples")) if given[option]}
+    found = boundary(
+        chute, second=BY_KEY[second].name, bounds=bounds, progress=_progress, **chosen, **options.search(given)
+    )
+    _clear()
+    if given["as_json"]:
+        from chuteflow.io import contract
+        from chuteflow.io.boundary_records import boundaries_object
+
+        answer = contract.text(boundaries_object(found))
+    else:
+        answer = "\n".join(_report(found, second))
+
+    def save(path: str) -> None:
+        from chuteflow.io import boundary_records
+
+        boundary_records.save(found, path)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.boundary_plot import plot_boundaries
+
+        return plot_boundaries(found, _UPRIGHT[upright])
+
+    options.deliver(given, answer, save, plotted)
+
+
+def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], Any]:
+    """The range of the second parameter, and the chute at its lower end.
+
+    Raises:
+        InputError: for a range that is missing, or given for another parameter.
+    """
+    for name in BY_KEY:
+        if name != second and isinstance(given[name], tuple):
+            low, high = given[name]
+            raise InputError(
+                f"--{name} {low:g}:{high:g}: only --{second} takes a range; follow through {name} with --in {name},Q"
+            )
+    bounds = given[second]
+    if not isinstance(bounds, tuple):
+        got = "is missing" if bounds is None else f"is {bounds:g}"
+        raise InputError(f"--{second} {got}: the second parameter takes a range LO:HI, for example 0.5:0.8")
+    return bounds, options.chute({**given, second: bounds[0]})
+
+
+def _progress(what: str, share: float) -> None:
+    if sys.stderr.isatty():
+        click.echo(f"\r\x1b[K{what}, {share:.0%} of the range", nl=False, err=True)
+
+
+def _clear() -> None:
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[K", nl=False, err=True)
+
+
+def _report(found: BoundarySet, second: str) -> Iterator[str]:
+    from chuteflow.io import words
+
+    yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
+    others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
+    said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
+    yield f"chute: {said}, surface {found.chute.surface}, closure {found.chute.closure}"
+    for i, boundary in enumerate(found, 1):
+        yield ""
+        yield f"boundary {i} of {len(found)}, {len(boundary.flows)} points"
+        yield _points(boundary, second)
+    yield ""
+    if found.reason:
+        yield f"no boundary: {found.reason}"
+    else:
+        largest = max(float(boundary.error.max()) for boundary in found)
+        yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
+    yield words.searched(found.searched, found.chute, None)
+    yield (
+        f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
+        "neither come near, could be missed"
+    )
+    if found.skipped:
+        yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
+
+
+def _points(boundary: Boundary, second: str) -> str:
+    """Both ends and the turning points of a boundary as a table."""
+    from chuteflow.bifurcations.tracing import TURNS
+    from chuteflow.io import contract, tables
+
+    chosen = [
+        ("begins", boundary.flows[0], boundary.ends[0]),
+        *((turn.kind, turn.flow, TURNS[turn.kind]) for turn in boundary.special),
+        ("ends", boundary.flows[-1], boundary.ends[1]),
+    ]
+    (symbols,) = tables.heading(contract.PLACE, None)
+    rows = [
+        [
+            kind,
+            tables.number(getattr(flow.chute, boundary.second)),
+            *tables.numbers(flow, contract.PLACE, flow.chute, None),
+            what,
+        ]
+        for kind, flow, what in chosen
+    ]
+    return tables.table([["", second, *symbols, ""], *rows], words=(0, len(symbols) + 2))

@@ -1,0 +1,132 @@
+"""``chuteflow curve``: every family of flows of a chute, with its special points."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.branches.results import Branch, Curve
+    from chuteflow.stability.along import MarkedBranch, MarkedCurve
+    from chuteflow.steady.quantities import Scales
+
+_EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --search-temperature 0.01:500"
+
+
+@click.command("curve", help=COMMANDS["curve"], epilog=_EPILOG)
+@options.chute_options
+@options.option("--points", type=click.INT, help="Flows on the longest branch; 200 by default.")
+@click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
+@options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
+@options.search_options
+@options.output_options
+@options.scale_options
+def command(**given: Any) -> None:
+    """Trace, print, save and draw."""
+    chute = options.chute(given)
+    scales = options.scales(given)
+    options.require_outputs(given)
+    if given["samples"] is not None and not given["stability"]:
+        raise InputError("--samples counts the flows judged with --stability: give both")
+    from chuteflow.branches.curve import curve
+
+    points = {} if given["points"] is None else {"points": given["points"]}
+    found = curve(chute, **points, **options.search(given))
+    judged = _judged(found, given["samples"]) if given["stability"] else None
+    if judged is not None:
+        found = judged.curve
+    if given["as_json"]:
+        from chuteflow.io import contract
+
+        content = contract.curve_object(found, scales)
+        if judged is not None:
+            from chuteflow.plotting.stability_curve import changes_objects, samples_objects
+
+            objects = samples_objects(judged, scales), changes_objects(judged, scales)
+            for branch, samples, changes in zip(content["branches"], *objects, strict=True):
+                branch["stability"], branch["stability_changes"] = samples, changes
+        answer = contract.text(content)
+    else:
+        answer = "\n".join(_report(found, judged, scales))
+
+    def save(path: str) -> None:
+        from chuteflow.io import files
+
+        files.save(found, path, scales=scales)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.plots import plot_curve
+        from chuteflow.plotting.stability_curve import plot_marked
+
+        return plot_curve(found, scales=scales) if judged is None else plot_marked(judged, scales=scales)
+
+    options.deliver(given, answer, save, plotted)
+
+
+def _judged(found: Curve, samples: int | None) -> MarkedCurve:
+    from chuteflow.stability.along import marked
+
+    def progress(share: float) -> None:
+        if sys.stderr.isatty():
+            click.echo(f"\r\x1b[K{share:.0%} of the flows judged", nl=False, err=True)
+
+    judged = marked(found, progress=progress, **({} if samples is None else {"samples": samples}))
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[K", nl=False, err=True)
+    return judged
+
+
+def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> Iterator[str]:
+    from chuteflow.io import words
+
+    yield words.chute(found.chute)
+    if scales is not None:
+        yield words.scales(scales)
+    for i, branch in enumerate(found.branches, 1):
+        yield ""
+        yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
+        yield _points(branch, found, scales)
+        yield from words.validity(branch.flows, found.chute, scales)
+        if judged is not None:
+            yield _stretches(judged.branches[i - 1], found, scales)
+    yield ""
+    if found.branches:
+        yield words.multiplicity(found, scales)
+    else:
+        yield words.in_own_units(f"no flow: {found.reason}", scales)
+    if found.incomplete:
+        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
+    yield words.searched(found.searched, found.chute, scales)
+
+
+def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
+    """Stable and unstable stretches of a family in words."""
+    from chuteflow.plotting.stability_curve import change_words, stretch
+
+    said = [stretch(run, found.chute, scales) for run in branch.runs]
+    ends = [change_words(change, found.chute, scales) for change in branch.changes]
+    lines = [f"stability, by {len(branch.samples)} flows: " + "; ".join(said)]
+    return "\n".join([*lines, *(["ends of stable ranges: " + "; ".join(ends)] if ends else [])])
+
+
+def _points(branch: Branch, found: Curve, scales: Scales | None) -> str:
+    from chuteflow.branches.results import KINDS
+    from chuteflow.io import contract, tables, words
+
+    chosen = [
+        ("begins", branch.flows[0], words.in_own_units(branch.ends[0], scales)),
+        *((point.kind, point.flow, KINDS[point.kind]) for point in branch.special),
+        ("ends", branch.flows[-1], words.in_own_units(branch.ends[1], scales)),
+    ]
+    header = [["", *cells, ""] for cells in tables.heading(contract.PLACE, scales)]
+    rows = [[kind, *tables.numbers(flow, contract.PLACE, found.chute, scales), what] for kind, flow, what in chosen]
+    return tables.table([*header, *rows], words=(0, len(contract.PLACE) + 1))

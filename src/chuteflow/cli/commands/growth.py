@@ -1,0 +1,145 @@
+"""``chuteflow growth``: growth rates of one flow over wavenumbers along and across the slope, and neutral curves."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.stability.planes import WaveMap
+
+#: Endings of the files that --save writes.
+SAVED = (".csv", ".json")
+_EPILOG = (
+    "Rates are in sqrt(g cos(theta)/d), wavenumbers in 1/d. A map of 40x40 takes about half a minute.\n\n"
+    "Example: chuteflow growth --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --size 12x12"
+)
+
+
+class Size(click.ParamType):
+    """Two whole numbers as MxN."""
+
+    name = "mxn"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Both numbers."""
+        try:
+            m, n = map(int, str(value).lower().split("x"))
+        except ValueError:
+            self.fail(f"{value!r} is not a size: write two whole numbers as MxN, for example 40x40", param, ctx)
+        return m, n
+
+
+@click.command("growth", help=COMMANDS["growth"], epilog=_EPILOG)
+@options.chute_options
+@options.condition_options
+@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.option(
+    "--kx", type=options.Interval(), help="Wavenumbers along the slope; by default to three times that of the maximum."
+)
+@options.option("--ky", type=options.Interval(), help="Wavenumbers across the slope.")
+@options.option("--size", type=Size(), help="Points along kx and ky; 40x40 by default.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+@options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
+def command(**given: Any) -> None:
+    """Solve, map, print, save and draw."""
+    options.require_outputs(given, SAVED)
+    chute = options.chute(given)
+    condition: dict[str, Any] = options.condition(given, chute, None)
+    from chuteflow.branches.enumeration import flows
+    from chuteflow.io import contract
+
+    found = flows(chute, **condition)
+    if not len(found):
+        empty = {"chute": contract.chute_object(chute), "flow": None, "reason": found.reason}
+        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        return
+    flow = options.chosen(found, given["which"])
+    from chuteflow.io.growth_records import wave_object, wave_rows
+    from chuteflow.stability.planes import wave_map
+
+    size = {} if given["size"] is None else {"size": given["size"]}
+    mapped = wave_map(flow, kx=given["kx"], ky=given["ky"], progress=progress, **size)
+    clear()
+    content = wave_object(mapped)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.growth_plot import plot_wave_map
+
+        return plot_wave_map(mapped)
+
+    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
+    options.deliver(given, answer, partial(write, content, wave_rows(mapped)), plotted)
+
+
+def write(content: Mapping[str, Any], rows: Iterator[list[str]], path: str) -> None:
+    """Write a map, as ``content`` or as ``rows``, to ``path``."""
+    from chuteflow.io import contract
+    from chuteflow.io.writing import write_whole
+
+    as_json = path.lower().endswith(".json")
+    text = contract.text(content) if as_json else "\n".join(",".join(row) for row in rows)
+    write_whole(path, text + "\n")
+
+
+def progress(share: float) -> None:
+    """How much of the map is done, on a terminal."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\x1b[K{share:.0%} of the map", nl=False, err=True)
+
+
+def clear() -> None:
+    """Take the progress away."""
+    if sys.stderr.isatty():
+        click.echo("\r\x1b[K", nl=False, err=True)
+
+
+def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
+    """At how many points of a map no mode is told, and at how many it is not known whether something grows."""
+    hidden = int((np.isnan(growth) & ~unresolved).sum())
+    if hidden:
+        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+    if unresolved.any():
+        yield f"not known at {int(unresolved.sum())} points: the finest grids do not tell whether something grows there"
+
+
+def _report(found: WaveMap) -> Iterator[str]:
+    from chuteflow.io import tables, words
+
+    flow = found.flow
+    yield words.chute(flow.chute)
+    yield f"flow: Q = {tables.number(flow.mass_flux)}, h = {tables.number(flow.centre_of_mass)}"
+    yield ""
+    growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
+    i, j = np.unravel_index(int(growth.argmax()), growth.shape)
+    if np.isfinite(growth[i, j]):
+        yield (
+            f"largest growth on the map: {tables.number(float(growth[i, j]))} at kx = "
+            f"{tables.number(float(found.kx[i]))}, ky = {tables.number(float(found.ky[j]))}"
+        )
+    yield (
+        f"growing: {int(found.grows.sum())} of {growth.size} points; growth below {found.smallest_rate:.2g} or below "
+        "its error counts as none"
+    )
+    yield from hidden_and_unresolved(found.growth, found.unresolved)
+    yield ""
+    if not found.neutral:
+        yield "no neutral curve in this range"
+        return
+    rows = [["neutral curve", "points", "from kx", "ky", "to kx", "ky", "error", "ends at"]]
+    for number, curve in enumerate(found.neutral, 1):
+        ends = [tables.number(float(value)) for z in (curve.z[0], curve.z[-1]) for value in z]
+        where = curve.ends[1] if curve.ends[0] == curve.ends[1] else "; ".join(curve.ends)
+        rows.append([str(number), str(len(curve.z)), *ends, f"{curve.error.max():.0e}", where])
+    yield tables.table(rows, words=(7,))

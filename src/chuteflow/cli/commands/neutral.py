@@ -1,0 +1,134 @@
+"""``chuteflow neutral``: growth of waves in one direction along a family of flows, and the neutral curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.commands.growth import SAVED, Size, clear, hidden_and_unresolved, progress, write
+from chuteflow.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.stability.planes import FamilyMap
+    from chuteflow.steady.flow import Flow
+
+#: Flows of the family between which others are solved, and range of surface temperatures unless another is given.
+_FLOWS, _TEMPERATURES = 80, (0.05, 50.0)
+_ANGLES = {"along": 0.0, "across": 90.0}
+_EPILOG = (
+    "k h is the wavenumber times the height of the centre of mass. The family is that of the hottest flows in the "
+    "range searched.\n\n"
+    "Example: chuteflow neutral --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --waves across --size 16x16"
+    " --plot neutral.png"
+)
+
+
+@click.command("neutral", help=COMMANDS["neutral"], epilog=_EPILOG)
+@options.chute_options
+@options.option("--waves", metavar="DIRECTION", help="along (the default), across, or an angle from 0 to 90 degrees.")
+@options.option("--kh", type=options.Interval(), help="Range of k h; 0.001:1 by default.")
+@options.option("--size", type=Size(), help="Points along k h and along the family; 24x24 by default.")
+@options.option("--search-temperature", type=options.Interval(), help="Surface temperatures; 0.05:50 by default.")
+@options.option("--largest-holdup", type=options.Number(), help="Largest mass hold-up searched; 30 by default.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+@options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
+def command(**given: Any) -> None:
+    """Trace, map, print, save and draw."""
+    options.require_outputs(given, SAVED)
+    chute = options.chute(given)
+    angle = _angle(given["waves"])
+    within: dict[str, Any] = {"surface_temperature": given["search_temperature"] or _TEMPERATURES}
+    if given["largest_holdup"] is not None:
+        within["largest_holdup"] = given["largest_holdup"]
+    from chuteflow.branches.curve import curve
+    from chuteflow.io import contract
+
+    traced = curve(chute, points=_FLOWS, **within)
+    if not traced.branches:
+        empty = {"chute": contract.chute_object(chute), "flows": None, "reason": traced.reason}
+        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {traced.reason}")
+        return
+    from chuteflow.io.growth_records import family_object, family_rows
+    from chuteflow.stability.planes import family_map
+
+    asked = {name: given[option] for name, option in (("depth_wavenumber", "kh"), ("size", "size")) if given[option]}
+    mapped = family_map(traced.branches[0].flows, angle=angle, progress=progress, **asked)
+    clear()
+    content = family_object(mapped)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.growth_plot import plot_family_map
+
+        return plot_family_map(mapped)
+
+    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
+    options.deliver(given, answer, partial(write, content, family_rows(mapped)), plotted)
+
+
+def _angle(waves: str | None) -> float:
+    if waves is None or waves in _ANGLES:
+        return _ANGLES[waves or "along"]
+    try:
+        return float(waves)
+    except ValueError:
+        raise InputError(f"--waves {waves}: must be along, across or an angle from 0 to 90 degrees") from None
+
+
+def _report(found: FamilyMap) -> Iterator[str]:
+    from chuteflow.io import tables, words
+
+    first, last = found.flows[0], found.flows[-1]
+    low, high = (tables.number(float(found.depth_wavenumber[end])) for end in (0, -1))
+    yield words.chute(found.flows[0].chute)
+    yield (
+        f"family: {_place(first)} to {_place(last)}; waves at {found.angle:g} degrees to the slope, "
+        f"k h from {low} to {high}"
+    )
+    yield ""
+    yield f"growing: {int(found.grows.sum())} of {found.growth.size} points"
+    yield from hidden_and_unresolved(found.growth, found.unresolved)
+    if not found.neutral:
+        yield f"no neutral curve: {_without(found)}"
+        return
+    yield ""
+    for number, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True), 1):
+        yield f"neutral curve {number}, {len(flows)} points, error of ln(k h) at most {curve.error.max():.0e}"
+        yield f"it begins at {curve.ends[0]}, and ends at {curve.ends[1]}"
+        yield tables.table([["k h", "Q", "h", "T_surface"], *_rows(curve.z[:, 0].tolist(), flows)])
+        yield ""
+
+
+def _without(found: FamilyMap) -> str:
+    """What the waves of the map do, as far as it is known."""
+    known = "all waves of this range" if not found.unresolved.any() else "all waves of this range that are known"
+    if found.grows.all(where=~found.unresolved):
+        return f"{known} grow"
+    return (
+        f"none is followed between the {int(found.grows.sum())} points that grow and the others"
+        if (found.grows.any())
+        else f"{known} decay"
+    )
+
+
+def _place(flow: Flow) -> str:
+    from chuteflow.io.tables import number
+
+    return f"T_surface = {number(flow.surface_temperature)}, Q = {number(flow.mass_flux)}"
+
+
+def _rows(depth_wavenumber: Sequence[float], flows: Sequence[Flow]) -> Iterator[list[str]]:
+    from chuteflow.io.tables import number
+
+    count = min(len(flows), 9)
+    for i in sorted({round(j * (len(flows) - 1) / max(count - 1, 1)) for j in range(count)}):
+        flow = flows[i]
+        numbers = (depth_wavenumber[i], flow.mass_flux, flow.centre_of_mass, flow.surface_temperature)
+        yield [number(value) for value in numbers]

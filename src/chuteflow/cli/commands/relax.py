@@ -1,0 +1,206 @@
+"""``chuteflow relax``: a disturbed flow followed in time, to the steady flow that it comes to."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.branches.results import FlowSet
+    from chuteflow.stability.layer import Layer
+    from chuteflow.stability.relaxation import Moment, Outcome
+    from chuteflow.steady.flow import Flow
+
+#: Rows of the table that is printed; nearness that counts as arrival, if it shrinks, and as rest.
+_ROWS, _ARRIVED, _SETTLED = 12, 0.01, 1e-6
+#: The picture begins at this share of the whole time, on a logarithmic axis.
+_FIRST = 1e-5
+_COLUMNS = {
+    "t": "time",
+    "Q": "mass_flux",
+    "h": "centre_of_mass",
+    "T_surface": "surface_temperature",
+    "T_base": "base_temperature",
+}
+_SAVED = (".csv", ".json")
+
+
+_EPILOG = (
+    "The flow stays the same all along the chute, and its hold-up M what it is: waves along and across the slope "
+    "are left out. The free surface alone is followed.\n\n"
+    "Example: chuteflow relax --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --heat 1.2"
+)
+
+
+@click.command("relax", help=COMMANDS["relax"], epilog=_EPILOG)
+@options.chute_options
+@options.condition_options
+@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.option(
+    "--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default, or 1 with --push."
+)
+@options.option("--push", type=options.Number(), help="Factor on the velocity; 1 by default.")
+@options.option("--duration", type=options.Number(), help="Time in sqrt(d/(g cos theta)); 2000 by default.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+@options.option("--save", metavar="FILE", help="Write the way to FILE: .csv or .json.")
+def command(**given: Any) -> None:
+    """Solve, disturb, follow and tell."""
+    from chuteflow.io import contract
+    from chuteflow.stability.relaxation import outcome
+
+    options.require_outputs(given, _SAVED)
+    duration = 2000.0 if given["duration"] is None else given["duration"]
+    if not 0.0 < duration <= 1e8:
+        raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
+    found = _found(given)
+    if not len(found):
+        empty = {"chute": contract.chute_object(found.chute), "flows": [], "reason": found.reason}
+        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        return
+    flow = options.chosen(found, given["which"])
+    layer, start = _start(flow, given["heat"], given["push"])
+    moments = _followed(layer, start, duration)
+    end = outcome(layer, moments)
+    content = _content(flow, moments, end)
+    answer = contract.text(content) if given["as_json"] else "\n".join(_told(flow, moments, end))
+    options.deliver(given, answer, partial(_save, content), partial(_plotted, flow, moments, end))
+
+
+def _found(given: Mapping[str, Any]) -> FlowSet:
+    from chuteflow.branches.enumeration import flows
+
+    chute = options.chute(given)
+    asked: dict[str, Any] = options.condition(given, chute, None)
+    return flows(chute, **asked)
+
+
+def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:
+    """The layer and its disturbed state."""
+    from chuteflow.stability.layer import Layer
+    from chuteflow.stability.relaxation import disturbed
+
+    layer = Layer.of(flow)
+    if heat is None:
+        heat = 1.1 if push is None else 1.0
+    return layer, disturbed(layer.steady(flow), temperature=heat, velocity=1.0 if push is None else push)
+
+
+def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
+    """All moments; how far it is, on a terminal, once a second."""
+    from chuteflow.stability.relaxation import relax
+
+    moments: list[Moment] = []
+    shown = time.monotonic()
+    telling = sys.stderr.isatty()
+    for moment in relax(layer, start, duration):
+        moments.append(moment)
+        if telling and time.monotonic() > shown + 1.0:
+            shown = time.monotonic()
+            click.echo(f"\r\x1b[Kt = {moment.time:.6g} of {duration:.6g}", nl=False, err=True)
+    if telling:
+        click.echo("\r\x1b[K", nl=False, err=True)
+    return moments
+
+
+def _content(flow: Flow, moments: Sequence[Moment], end: Outcome) -> dict[str, Any]:
+    from chuteflow.io.contract import chute_object, flow_object
+
+    return {
+        "chute": chute_object(flow.chute),
+        "from": flow_object(flow),
+        **{symbol: [getattr(moment, name) for moment in moments] for symbol, name in _COLUMNS.items()},
+        "steady": [flow_object(candidate) for candidate in end.steady],
+        "nearest": end.nearest,
+        "distance": end.distance if end.nearest is not None else None,
+        "rate": end.rate,
+        "leading": end.leading,
+        "arrested": end.arrested,
+    }
+
+
+def _told(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Iterator[str]:
+    from chuteflow.io import words
+    from chuteflow.io.tables import number, table
+
+    wanted = {round(i * (len(moments) - 1) / (_ROWS - 1)) for i in range(_ROWS)}
+    rows = [[number(getattr(moments[i], name)) for name in _COLUMNS.values()] for i in sorted(wanted)]
+    yield words.chute(flow.chute)
+    yield ""
+    yield table([list(_COLUMNS), *rows])
+    yield ""
+    yield _verdict(flow, moments[-1], end)
+
+
+def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
+    from chuteflow.io.tables import number
+
+    if end.arrested:
+        return f"it comes to rest at t = {number(last.time)}: collisions take more energy than the slope gives"
+    if end.nearest is None:
+        return f"no steady flow has this hold-up within the range searched, M = {number(flow.mass_holdup)}"
+    target = end.steady[end.nearest]
+    same = abs(target.surface_temperature / flow.surface_temperature - 1.0) < 1e-6
+    name = "the flow it came from" if same else f"another flow of the same hold-up, Q = {number(target.mass_flux)}"
+    away = f"{100.0 * end.distance:.2g} % away"
+    if end.distance < _SETTLED:
+        return f"it has come to {name}: {away} at t = {number(last.time)}"
+    pace = f"the distance changed at the rate {number(end.rate)} in the last fifth of the time"
+    if end.leading is not None:
+        pace += (
+            f" (the leading discrete mode of that flow has the rate {number(end.leading)}; what is slower "
+            "belongs to the continuous spectrum and depends on the grid)"
+        )
+    if end.distance < _ARRIVED and end.rate < 0.0:
+        return f"it comes to {name}: {away} at t = {number(last.time)}, and {pace}"
+    return (
+        f"not settled at t = {number(last.time)}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
+    )
+
+
+def _save(content: dict[str, Any], path: str) -> None:
+    from chuteflow.io import contract
+    from chuteflow.io.writing import write_whole
+
+    if path.lower().endswith(".json"):
+        write_whole(path, contract.text(content) + "\n")
+    else:
+        rows = zip(*(content[symbol] for symbol in _COLUMNS), strict=True)
+        lines = [",".join(_COLUMNS), *(",".join(map(repr, row)) for row in rows)]
+        write_whole(path, "\n".join(lines) + "\n")
+
+
+def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Figure:
+    """Q, h and T at the base against the logarithm of time, and their values in the steady flows."""
+    from matplotlib.lines import Line2D
+
+    from chuteflow.plotting import style
+    from chuteflow.plotting.plots import parameters
+
+    figure, axes = style.panels(3, height=3.1)
+    rest = style.Stroke(style.BLACK, style.DOTTED)
+    later = [moment for moment in moments if moment.time > _FIRST * moments[-1].time]
+    for ax, name in zip(axes, ("mass_flux", "centre_of_mass", "base_temperature"), strict=True):
+        ax.plot([m.time for m in later], [getattr(m, name) for m in later], **style.stroke(0).line())
+        for steady in end.steady:
+            ax.axhline(getattr(steady, name), **rest.line(0.8))
+        style.logarithmic(ax, "x")
+        style.name_axes(ax, "time, $t$", style.label(name))
+    key = [
+        Line2D([], [], label="disturbed flow", **style.stroke(0).line()),
+        Line2D([], [], label=f"steady flows of the hold-up $M = {flow.mass_holdup:.4g}$", **rest.line(0.8)),
+    ]
+    style.caption(figure, parameters(flow.chute))
+    style.legend(figure, handles=key, loc="outside lower center", ncols=2)
+    return figure

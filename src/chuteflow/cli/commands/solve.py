@@ -1,0 +1,109 @@
+"""``chuteflow solve``: every steady flow of a chute at a flux, hold-up, centre of mass or temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.branches.results import FlowSet
+    from chuteflow.steady.quantities import Scales
+
+_EPILOG = (
+    "Numbers are dimensionless, in grain diameters d and sqrt(g d cos theta). With --diameter and --density "
+    'results are in SI units; an AMOUNT may then carry a unit too, such as --flux "0.7 kg/m/s", and is '
+    "dimensionless without one.\n\n"
+    "Example: chuteflow solve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3"
+)
+#: Columns of the table; the height of the interface is left out on the half-line.
+_COLUMNS = (
+    "mass_flux",
+    "centre_of_mass",
+    "mass_holdup",
+    "surface_temperature",
+    "base_temperature",
+    "base_volume_fraction",
+    "largest_volume_fraction",
+    "slip_velocity",
+    "depth",
+    "interface_height",
+)
+
+
+@click.command("solve", help=COMMANDS["solve"], epilog=_EPILOG)
+@options.chute_options
+@options.condition_options
+@options.search_options
+@options.output_options
+@options.scale_options
+def command(**given: Any) -> None:
+    """Solve, print, save and draw."""
+    chute = options.chute(given)
+    scales = options.scales(given)
+    condition = options.condition(given, chute, scales)
+    options.require_outputs(given)
+    from chuteflow.branches.enumeration import flows
+
+    found = flows(chute, **condition, **options.search(given))
+    if given["as_json"]:
+        from chuteflow.io import contract
+
+        answer = contract.text(contract.flow_set_object(found, scales))
+    else:
+        answer = "\n".join(_report(found, scales))
+
+    def save(path: str) -> None:
+        from chuteflow.io import files
+
+        files.save(found, path, scales=scales)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.plots import plot_flows
+
+        return plot_flows(found, scales=scales)
+
+    options.deliver(given, answer, save, plotted)
+
+
+def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
+    from chuteflow.io import tables, words
+
+    yield words.chute(found.chute)
+    if scales is not None:
+        yield words.scales(scales)
+    if found.flows:
+        columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
+        header = [
+            ["", *cells, end, word]
+            for cells, end, word in zip(
+                tables.heading(columns, scales), ("error", "[1]"), ("validity", ""), strict=False
+            )
+        ]
+        rows = [
+            [
+                *(str(i), *tables.numbers(flow, columns, found.chute, scales)),
+                *(f"{flow.error:.0e}", flow.validity.summary),
+            ]
+            for i, flow in enumerate(found, 1)
+        ]
+        yield ""
+        yield tables.table([*header, *rows], words=(len(columns) + 2,))
+        yield ""
+        for i, flow in enumerate(found, 1):
+            yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
+        yield ""
+        yield from words.notes(found)
+        largest = max(flow.error for flow in found)
+        yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
+    else:
+        yield words.in_own_units(f"no flow: {found.reason}", scales)
+    if found.incomplete:
+        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
+    yield words.searched(found.searched, found.chute, scales)

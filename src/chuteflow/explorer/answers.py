@@ -1,0 +1,231 @@
+"""Answers to the questions of the page, made in a process beside the server."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chuteflow.branches.curve import curve
+from chuteflow.branches.enumeration import flows
+from chuteflow.branches.results import KINDS, Branch
+from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.explorer import queries, sentences
+from chuteflow.explorer.queries import GRAINS, Query
+from chuteflow.explorer.recipes import recipes
+from chuteflow.io import contract
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS
+
+#: Relative error allowed: far below what can be seen on a page. Exports are exact.
+_VISIBLE = 1e-6
+_CURVE_POINTS = 90
+#: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
+#: they are halved until a straight line across each is off by this share of a field's largest value at most.
+_INTERVALS, _STRAIGHT, _HALVINGS = 16, 1e-3, 8
+#: A flow itself is so many times as high as its centre of mass; so are all profiles, by the highest of the flows.
+_TOP = 2.5
+_FIELDS = {
+    "nu": "volume_fraction",
+    "T": "granular_temperature",
+    "u": "velocity",
+    "production": "production",
+    "dissipation": "dissipation",
+}
+_DIGITS = 7
+#: What else a computation may end with, which is no reason to end the process.
+_FAILURES = (ArithmeticError, ValueError, LookupError)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is sent back: a status of HTTP, a media type, the bytes, and a file name for downloads."""
+
+    status: int
+    media: str
+    body: bytes
+    name: str | None = None
+
+
+def answer(question: str, query: Query) -> Answer:
+    """The answer to one of QUESTIONS; a bad query or a failure is an answer too."""
+    try:
+        return QUESTIONS[question](query)
+    except InputError as error:
+        return problem(400, str(error))
+    except ChuteflowError as error:
+        return left_out(question, query, str(error))
+    except _FAILURES as error:
+        return left_out(question, query, f"the computation failed ({type(error).__name__}: {error})")
+
+
+def problem(status: int, what: str) -> Answer:
+    """An answer that says what went wrong."""
+    return _json({"error": " ".join(what.split())}, status)
+
+
+#: What is left out where a question has no answer.
+_LEFT_OUT = {
+    "flows": "the flows at this flux are left out",
+    "curve": "the curve of all flows is left out",
+    "map": "this column of the map is left out",
+    "export": "this file is left out",
+    "stability": "the stability of this flow is left out",
+}
+
+
+def left_out(question: str, query: Query, why: str) -> Answer:
+    """An answer that says what is left out and why; in place of flows, also how to compute them elsewhere."""
+    content: dict[str, Any] = {"error": " ".join(f"{_LEFT_OUT[question]}: {why}".split())}
+    if question == "flows":
+        chute, other = queries.read(query, other=("Q",), optional=GRAINS)
+        ways = recipes(chute, queries.flux(other["Q"]), queries.scales(other))
+        content |= {"chute": contract.chute_object(chute), "flows": [], "recipes": ways}
+    return _json(content, 422)
+
+
+def _json(content: Any, status: int = 200) -> Answer:
+    return Answer(status, "application/json", json.dumps(content, allow_nan=False).encode())
+
+
+def _flows(query: Query) -> Answer:
+    chute, other = queries.read(query, other=("Q",), optional=GRAINS)
+    flux, scales = queries.flux(other["Q"]), queries.scales(other)
+    found = flows(chute, Q=flux, tolerance=_VISIBLE)
+    top = _TOP * max((flow.centre_of_mass for flow in found), default=1.0)
+    shown = [
+        {
+            **_place(flow),
+            "profile": _profile(flow, top),
+            "budget": asdict(flow.energy_budget) | {"heat_from_base": flow.energy_budget.heat_from_base},
+            **sentences.of_flow(flow, found),
+        }
+        for flow in found
+    ]
+    return _json(
+        {
+            "chute": contract.chute_object(chute),
+            "flows": shown,
+            "top": top,
+            "says": sentences.of_flows(found, flux, scales),
+            "recipes": recipes(chute, flux, scales),
+        }
+    )
+
+
+def _place(flow: Flow) -> dict[str, Any]:
+    """Where a flow is on the curve, how well that is known, and how far the flow keeps to the theory."""
+    told = contract.flow_object(flow)
+    names = (*(NUMBERS[name].symbol for name in contract.PLACE), "error", "validity")
+    return {name: told[name] for name in names}
+
+
+def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
+    """Fields over height, at so many heights that straight lines between them show no corner that is not there."""
+    highest = min(top, flow.interface_height)
+    own = min(_TOP * flow.centre_of_mass, highest)
+    heights = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
+    fields = _fields(flow, heights)
+    bends = np.ones(len(heights) - 1, dtype=bool)
+    for _ in range(_HALVINGS):
+        middles = 0.5 * (heights[1:] + heights[:-1])[bends]
+        exact = _fields(flow, middles)
+        straight = 0.5 * (fields[:, 1:] + fields[:, :-1])[:, bends]
+        off = (np.abs(exact - straight) > _STRAIGHT * np.abs(fields).max(axis=1, keepdims=True)).any(axis=0)
+        places = np.flatnonzero(bends) + 1
+        heights, fields = np.insert(heights, places, middles), np.insert(fields, places, exact, axis=1)
+        # Both halves of an interval that bends are looked at again, the others are done.
+        halves = np.where(bends, 2, 1)
+        bends[bends] = off
+        bends = np.repeat(bends, halves)
+        if not off.any():
+            break
+    return {"z": _short(heights)} | {name: _short(field) for name, field in zip(_FIELDS, fields, strict=True)}
+
+
+def _fields(flow: Flow, heights: Array) -> Array:
+    """The fields (fields, heights) that the page shows."""
+    profile = flow.profile(heights)
+    return np.array([getattr(profile, name) for name in _FIELDS.values()])
+
+
+def _short(values: np.ndarray) -> list[float]:
+    return [float(f"{value:.{_DIGITS}g}") for value in values]
+
+
+def _curve(query: Query) -> Answer:
+    chute, other = queries.read(query, optional=GRAINS)
+    scales = queries.scales(other)
+    found = curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
+    content = contract.curve_object(found)
+    for branch, entry in zip(found.branches, content["branches"], strict=True):
+        entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
+        # The page shows where the limits are passed, without the numbers behind it.
+        entry["validity"] = {"words": entry["validity"]["words"]}
+    return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
+
+
+def _rounded(branch: Branch) -> dict[str, list[float]]:
+    return {NUMBERS[name].symbol: _short(getattr(branch, name)) for name in contract.PLACE}
+
+
+def _map(query: Query) -> Answer:
+    from chuteflow.explorer.domains import map_column
+
+    return _json(asdict(map_column(queries.map_column(query))))
+
+
+def _stability(query: Query) -> Answer:
+    from chuteflow.explorer.growth import verdict
+
+    chute, other = queries.read(query, other=("Q", "flow"), optional=GRAINS)
+    scales = queries.scales(other)
+    found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
+    number = other["flow"]
+    if number not in map(str, range(len(found))):
+        raise InputError(f"flow = {number[:40]!r}: there are {len(found)} flows, counted from 0")
+    known = verdict(found[int(number)])
+    says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
+    return _json(asdict(known) | {"says": says, "waves": waves})
+
+
+def _export(query: Query) -> Answer:
+    from chuteflow.io import files
+    from chuteflow.plotting import plots
+
+    chute, other = queries.read(query, other=("Q", "what", "format"), optional=GRAINS)
+    scales = queries.scales(other)
+    kinds: dict[str, Callable[[], Any]] = {
+        "profiles": lambda: flows(chute, Q=queries.flux(other["Q"])),
+        "curve": lambda: curve(chute),
+    }
+    media = {"csv": "text/csv", "svg": "image/svg+xml", "png": "image/png"}
+    for name, table in (("what", kinds), ("format", media)):
+        if other[name] not in table:
+            raise InputError(f"{name} = {other[name][:40]!r}: choose one of {', '.join(table)}")
+    what, suffix = other["what"], other["format"]
+    result = kinds[what]()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"chuteflow-{what}.{suffix}"
+        if suffix == "csv":
+            files.save(result, path, scales=scales)
+        else:
+            draw = plots.plot_flows if what == "profiles" else plots.plot_curve
+            plots.write_figure(draw(result, scales=scales), path)
+        return Answer(200, media[suffix], path.read_bytes(), path.name)
+
+
+#: What can be asked, by the last part of its address.
+QUESTIONS: dict[str, Callable[[Query], Answer]] = {
+    "flows": _flows,
+    "curve": _curve,
+    "map": _map,
+    "stability": _stability,
+    "export": _export,
+}

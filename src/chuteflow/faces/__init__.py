@@ -1,1 +1,0 @@
-"""Plots, files, units and the command line: thin, no science in them."""

@@ -1,0 +1,77 @@
+"""Results to files and back: NetCDF, CSV or JSON, by the ending of the name."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chuteflow.errors import InputError
+from chuteflow.io.records import KIND_OF, Result
+from chuteflow.io.writing import require_suffix, require_writable, write_whole
+from chuteflow.steady.quantities import Scales
+
+if TYPE_CHECKING:
+    from chuteflow.maps import Domain
+
+#: The module of each format, imported when it is needed; each has write(result, stream, scales) and read(path).
+FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
+#: What reading a damaged file may raise.
+_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)
+
+
+def save(result: Result | Domain, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
+    """Write a flow, a set of flows, a curve or a domain to ``path``: .nc (NetCDF 4, CF conventions), .csv or .json.
+
+    The file holds every number of the registry; .nc and, but for curves, .csv also the profiles of all fields
+    up to the depth. Numbers are dimensionless, or in SI units where ``scales`` are given. :func:`load` gives
+    the result back to the last bit in either case. The file is whole or absent.
+
+    Raises:
+        InputError: for a result or an ending that is not known, or a file that cannot be written.
+    """
+    from chuteflow.maps import Domain
+
+    if isinstance(result, Domain):
+        _save_domain(result, path, scales)
+        return
+    if type(result) not in KIND_OF:
+        raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows, a curve or a domain")
+    writer = import_module(f"chuteflow.io.{FORMATS[require_writable(path, tuple(FORMATS))]}")
+    stream = BytesIO()
+    writer.write(result, stream, scales)
+    write_whole(path, stream.getvalue())
+
+
+def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | None) -> None:
+    from chuteflow.io import domain_records
+
+    if scales is not None:
+        raise InputError("a domain has no units: save it without scales")
+    suffix = require_writable(path, tuple(FORMATS))
+    stream = BytesIO()
+    domain_records.write(found, stream, suffix)
+    write_whole(path, stream.getvalue())
+
+
+def load(path: str | os.PathLike[str]) -> Result | Domain:
+    """The flow, set of flows, curve or domain that :func:`save` wrote to ``path``; its numbers are dimensionless.
+
+    Raises:
+        InputError: for a file that is missing, damaged, of another program or of a later version.
+    """
+    from chuteflow.io import domain_records
+
+    reader = import_module(f"chuteflow.io.{FORMATS[require_suffix(path, tuple(FORMATS))]}")
+    try:
+        found = domain_records.read(Path(path))
+        return reader.read(Path(path)) if found is None else found
+    except InputError as error:
+        raise InputError(f"cannot load {path}: {error}") from None
+    except OSError as error:
+        what = error.strerror or "it is not a file of this format"
+        raise InputError(f"cannot load {path}: {what}") from None
+    except _DAMAGE:
+        raise InputError(f"cannot load {path}: it is damaged, or was not written by chuteflow") from None

@@ -1,0 +1,123 @@
+"""Stability as JSON and CSV: one object for each flow, numbers that are not known null."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chuteflow.branches.results import FlowSet
+from chuteflow.io.contract import chute_object, finite, flow_object, searched_object
+from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.modes import Mode
+from chuteflow.stability.verdict import Stability
+from chuteflow.steady.flow import Flow
+
+#: The disturbed fields, in the order of :attr:`Mode.fields`.
+FIELDS = ("nu", "u", "v", "w", "T")
+#: Columns of a CSV file.
+COLUMNS = ("Q", "h", "M", "T_surface", "stable", "kind", "kx", "ky", "growth", "frequency", "speed", "error")
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is known of one flow: its stability and its leading modes, or in ``reason`` why it is not known."""
+
+    flow: Flow
+    found: Stability | None
+    modes: tuple[Mode, ...]
+    reason: str | None
+
+
+def answers_object(flows: FlowSet, answers: Sequence[Answer], *, fields: bool = False) -> dict[str, Any]:
+    """What ``chuteflow stability --json`` prints; with ``fields`` the disturbed fields of each mode too."""
+    return {
+        "chute": chute_object(flows.chute),
+        "flows": [_answer(answer, fields) for answer in answers],
+        "searched": searched_object(flows.chute, flows.searched),
+        "reason": flows.reason,
+    }
+
+
+def mode_object(mode: Mode, *, fields: bool = False) -> dict[str, Any]:
+    """One mode; with ``fields`` heights, and real and imaginary parts of the disturbances there."""
+    numbers: dict[str, Any] = {
+        "kx": mode.kx,
+        "ky": mode.ky,
+        "growth": finite(mode.growth),
+        "frequency": finite(mode.frequency),
+        "speed": None if mode.speed is None else finite(mode.speed),
+        "kind": mode.kind,
+        "error": finite(mode.error),
+    }
+    if fields:
+        numbers["z"] = mode.height.tolist()
+        for name, values in zip(FIELDS, mode.fields, strict=True):
+            numbers[name] = {"real": np.real(values).tolist(), "imaginary": np.imag(values).tolist()}
+    return numbers
+
+
+def budget_object(budget: Budget) -> dict[str, Any]:
+    """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates."""
+    return {
+        "growth": finite(budget.mode.growth),
+        "closure": finite(budget.closure),
+        "shares": dict(zip(("kinetic", "density", "thermal"), map(finite, budget.shares), strict=True)),
+        "terms": {
+            term.name.replace(" ", "_"): {
+                "kinetic": finite(term.kinetic),
+                "density": finite(term.density),
+                "thermal": finite(term.thermal),
+                "total": finite(term.total),
+            }
+            for term in budget.terms
+        },
+    }
+
+
+def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
+    """A head and one row for each mode, or one for a flow without; empty where there is no number."""
+    rows: list[list[str]] = [list(COLUMNS)]
+    for answer in answers:
+        flow = flow_object(answer.flow)
+        start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]
+        known = None if answer.found is None else answer.found.stable
+        stable = "" if known is None else str(known).lower()
+        for mode in answer.modes or (None,):
+            numbers = {} if mode is None else mode_object(mode)
+            cells = [numbers.get(name) for name in COLUMNS[5:]]
+            rows.append([*start, stable, *("" if cell is None else str(cell) for cell in cells)])
+    return rows
+
+
+def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
+    found = answer.found
+    modes = [mode_object(mode, fields=fields) for mode in answer.modes]
+    return {
+        **flow_object(answer.flow),
+        "stable": None if found is None else found.stable,
+        "mode": modes[0] if modes else None,
+        "modes": modes,
+        "budget": None if not answer.modes else budget_object(energy_budget(answer.modes[0])),
+        "grows": None if found is None or found.mode is None else found.grows,
+        "threshold": None if found is None else found.smallest_rate,
+        "wavenumbers": None if found is None else list(found.searched),
+        "complete": False if found is None else found.complete,
+        "examined": 0 if found is None else found.examined,
+        "unresolved": [] if found is None else [{"kx": kx, "ky": ky} for kx, ky in found.unresolved],
+        "why": answer.reason or (None if found is None else why_unknown(found)),
+    }
+
+
+def why_unknown(found: Stability) -> str | None:
+    """Why ``stable`` is None, or None where it is not."""
+    if found.stable is not None:
+        return None
+    if not found.complete:
+        return "one wave or one direction was examined: without --kx and --ky all are searched"
+    return (
+        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids do not "
+        "tell whether something does"
+    )

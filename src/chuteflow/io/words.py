@@ -1,0 +1,111 @@
+"""Flows, chutes and ranges said in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.results import Curve, Searched
+from chuteflow.io.contract import factor
+from chuteflow.io.tables import number
+from chuteflow.parameters import PARAMETERS
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.validity import WORDS
+
+_DENSITIES = {
+    "monotonic": "density falls with height everywhere (monotonic)",
+    "inverted": "densest above the base (density inverted)",
+}
+_INTERIORS = {
+    "dissipative": "interior dissipative throughout",
+    "productive": "interior productive throughout",
+    "mixed": "interior productive in some places and dissipative in others (mixed)",
+}
+_SURFACES = {"free": "free surface", "interface": "interface with free grains above"}
+
+
+def among(flow: Flow, flows: Sequence[Flow]) -> str:
+    """The name of ``flow``; where others of them have the same one, its number among these, in their order."""
+    alike = [other for other in flows if other.name == flow.name]
+    return flow.name if len(alike) < 2 else f"{flow.name} ({alike.index(flow) + 1} of {len(alike)})"
+
+
+def notes(flows: Sequence[Flow]) -> list[str]:
+    """What the columns and words of a table of ``flows`` mean that do not explain themselves."""
+    said = {word for flow in flows for word in flow.validity.words}
+    depth = "that of the interface, or " if any(flow.chute.surface == "interface" for flow in flows) else ""
+    return [
+        f"depth: {depth}the height above which nu is below 1 % of nu_max; the centre of mass is h",
+        *(f"{word}: {meaning}" for word, meaning in WORDS.items() if word in said),
+    ]
+
+
+def validity(flows: Sequence[Flow], chute: Chute, scales: Scales | None) -> Iterator[str]:
+    """How far the flows of a family keep to the theory, a line for each stretch of their surface temperatures."""
+    warmth = factor("surface_temperature", chute, scales)
+    for summary, stretch in groupby(flows, key=lambda flow: flow.validity.summary):
+        ends = [flow.surface_temperature * warmth for flow in stretch]
+        yield f"from T_surface = {number(ends[0])} to {number(ends[-1])}: {summary}"
+
+
+def kinds(flow: Flow) -> str:
+    """Density and interior of ``flow``."""
+    return f"{_DENSITIES[flow.density]}; {_INTERIORS[flow.interior]}"
+
+
+def chute(chute: Chute) -> str:
+    """All parameters of ``chute``."""
+    slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
+    numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
+    return f"chute: {numbers}, {_SURFACES[chute.surface]}, closure {chute.closure}"
+
+
+def scales(scales: Scales) -> str:
+    """The grains behind results in SI units."""
+    grains = f"grains: diameter {scales.diameter:g} m, density {scales.density:g} kg/m^3"
+    return f"{grains}; gravity {scales.gravity:g} m/s^2"
+
+
+def in_own_units(sentence: str, scales: Scales | None) -> str:
+    """A sentence of the analyses, whose numbers stay dimensionless beside results in SI units."""
+    return sentence if scales is None else f"{sentence} (dimensionless)"
+
+
+def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
+    """The range searched."""
+    warmth, mass = factor("surface_temperature", chute, scales), factor("mass_holdup", chute, scales)
+    low, high = (value * warmth for value in range_.surface_temperature)
+    return (
+        f"searched: T_surface from {low:.4g} to {high:.4g}{_unit('surface_temperature', scales)}, "
+        f"M up to {range_.largest_holdup * mass:.4g}{_unit('mass_holdup', scales)}"
+    )
+
+
+def multiplicity(curve: Curve, scales: Scales | None) -> str:
+    """How many flows share one mass flux, from folds and ends of the branches."""
+    flux, unit = factor("mass_flux", curve.chute, scales), _unit("mass_flux", scales)
+    counts = flux_counts(curve)
+    known = [f"{'at least ' if c.at_least else ''}{c.flows} for {_fluxes(c, flux)}" for c in counts if c.flows]
+    unknown = [_fluxes(c, flux) for c in counts if c.at_least and not c.flows]
+    said = f"flows that share one mass flux: {', '.join(known)}{unit}"
+    if unknown:
+        said += f"; not known for {' and '.join(unknown)}{unit}"
+    if any(c.at_least for c in counts):
+        said += ", where branches leave the range searched"
+    return said
+
+
+def _fluxes(count: Count, factor: float) -> str:
+    """The mass fluxes of a count."""
+    low, high = number(count.low * factor), number(count.high * factor)
+    if count.low == 0.0:
+        return f"Q below {high}"
+    return f"Q above {low}" if count.high == math.inf else f"Q from {low} to {high}"
+
+
+def _unit(name: str, scales: Scales | None) -> str:
+    return "" if scales is None else f" {NUMBERS[name].unit}"

@@ -1,0 +1,8 @@
+"""Where flows exist, how many and of what kind, over two parameters of a chute."""
+
+from chuteflow.maps.domain import Domain, domain
+from chuteflow.maps.existence import exists_at
+from chuteflow.maps.outlines import KINDS_OF_BOUNDARIES, Boundary, Region
+from chuteflow.maps.plane import CODES, Axis, Plane
+
+__all__ = ["CODES", "KINDS_OF_BOUNDARIES", "Axis", "Boundary", "Domain", "Plane", "Region", "domain", "exists_at"]

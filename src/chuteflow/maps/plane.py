@@ -1,0 +1,183 @@
+"""A plane of two parameters of a chute, and what a point of it is classified by.
+
+Along one axis, ``inner``, points are cheap: where it is a parameter of the base, all points of a column share
+one fan of trajectories.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from chuteflow.branches.ranges import Range
+from chuteflow.checks import number
+from chuteflow.errors import InputError
+from chuteflow.maps.fan import Base, Fan, fan
+from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
+from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
+from chuteflow.steady.chute import Chute
+from chuteflow.theory.constitutive import Law, require_limit
+from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
+
+#: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
+#: for. All but the first two are 1 where there are such flows, else 0.
+CODES = ("most", "families", *INTERIORS, *DENSITIES)
+#: The same in few numbers: whether there are hot flows (1, 0, or -1 where the theory does not say), the numbers of
+#: flows that share one flux and of families, and the bits of the kinds of interior and of density.
+SUMMARY = ("hot", "most", "families", "interior", "density")
+#: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
+#: each bound a point is.
+HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
+#: Columns of surface temperature to a decade.
+_PER_DECADE = 12
+#: Bases between the ends of an axis, which bound what a fan has to serve.
+_BETWEEN = 5
+
+#: The class of a point: integers in the order of CODES, then 0 or 1 for each temperature; or that of HOT_CODES.
+Code = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter from ``low`` to ``high``.
+
+    Raises:
+        InputError: for an unknown parameter or an empty range.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if self.name not in PARAMETERS:
+            raise InputError(f"unknown parameter {self.name!r}: choose one of {', '.join(PARAMETERS)}")
+        for end in ("low", "high"):
+            object.__setattr__(self, end, number(self.name, getattr(self, end)))
+        object.__setattr__(self, "high", PARAMETERS[self.name].rounded(self.high))
+        if not self.low < self.high:
+            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
+
+    def at(self, share: Any) -> Any:
+        """The value (or values) at a share of the range, 0 to 1."""
+        return self.low + (self.high - self.low) * share
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Two axes, and the values of all else.
+
+    ``chute`` has the fixed parameters, those of the axes at a value that does not matter; ``temperatures`` are
+    those at which flows are looked for; ``within`` is the range searched.
+
+    Raises:
+        InputError: for twice the same axis, or for a corner that is no chute.
+    """
+
+    x: Axis
+    y: Axis
+    chute: Chute
+    temperatures: tuple[float, ...]
+    within: Range = field(default_factory=lambda: Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
+
+    def __post_init__(self) -> None:
+        if self.x.name == self.y.name:
+            raise InputError(f"both axes are {self.x.name}: give two parameters")
+        for x in (self.x.low, self.x.high):
+            for y in (self.y.low, self.y.high):
+                corner = self.at(x, y)
+                require_limit(corner.law, corner.restitution, corner.slope, "maps need")
+
+    def at(self, x: float, y: float) -> Chute:
+        """The chute at values of the two parameters."""
+        changed: dict[str, Any] = {self.x.name: float(x), self.y.name: float(y)}
+        return replace(self.chute, **changed)
+
+    @property
+    def transposed(self) -> bool:
+        """Whether the inner axis is ``x``: the first that is of the base, else ``y``."""
+        return PARAMETERS[self.x.name].of_base and not PARAMETERS[self.y.name].of_base
+
+    @property
+    def outer(self) -> Axis:
+        """The axis along which columns are placed."""
+        return self.y if self.transposed else self.x
+
+    @property
+    def inner(self) -> Axis:
+        """The axis along a column."""
+        return self.x if self.transposed else self.y
+
+    def chute_at(self, outer: float, inner: float) -> Chute:
+        """The chute at shares 0 to 1 of the outer and inner axis."""
+        u, v = float(self.outer.at(outer)), float(self.inner.at(inner))
+        return self.at(v, u) if self.transposed else self.at(u, v)
+
+
+def code(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
+    found = _kinds(plane, plane.chute_at(outer, inner))
+    return (
+        found.most,
+        found.families,
+        *(int(found.interior & bit > 0) for bit in INTERIORS.values()),
+        *(int(found.density & bit > 0) for bit in DENSITIES.values()),
+        *map(int, found.at),
+    )
+
+
+def summary(plane: Plane, outer: float, inner: float) -> Code:
+    """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
+    found = _kinds(plane, plane.chute_at(outer, inner))
+    hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    return (hot, found.most, found.families, found.interior, found.density)
+
+
+def _kinds(plane: Plane, chute: Chute) -> Kinds:
+    return kinds(_fan(plane, replace(chute, **_neutral(plane)), chute.law), Base.of(chute))
+
+
+def hot_code(plane: Plane, outer: float, inner: float) -> Code:
+    """What is known in closed form of the point at shares of the outer and inner axis, by HOT_CODES.
+
+    All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
+    than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
+    """
+    chute = plane.chute_at(outer, inner)
+    closure = chute.law
+    limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
+    found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
+    gained, lost = found.F21 > 0.0, found.delta > 0.0
+    strong = gained and lost
+    return (
+        int(found.obstacle is None),
+        int(gained),
+        int(lost),
+        int(strong and found.lambda_ >= LAMBDA_C),
+        int(strong and found.lambda_ > inversion_lambda()),
+    )
+
+
+def _neutral(plane: Plane) -> dict[str, Any]:
+    """Fixed values of those parameters that one fan serves all values of."""
+    return {axis.name: axis.low for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
+
+
+@lru_cache(maxsize=4)
+def _fan(plane: Plane, chute: Chute, registered: Law) -> Fan:
+    """The fan of all points of ``plane`` whose grains, with their law, and slope are those of ``chute``."""
+    del registered  # known here to tell what is remembered of one law from that of another
+    served = [chute]
+    for axis in (plane.x, plane.y):
+        if PARAMETERS[axis.name].of_base:
+            shares = np.linspace(0.0, 1.0, _BETWEEN)
+            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
+    return fan(chute, [Base.of(base) for base in served], plane.within, np.array(plane.temperatures), _PER_DECADE)
+
+
+@lru_cache(maxsize=64)
+def _dilute(closure: Law, e: float, slope: float) -> Dilute:
+    return dilute(closure, e, slope)

@@ -1,0 +1,1 @@
+"""Pictures of results, and the style of all figures; matplotlib is imported when one is drawn."""

@@ -1,0 +1,252 @@
+"""The look of all figures: strokes that differ in print and for the colour-blind, panels and labels.
+
+matplotlib is imported when a figure is made, through its objects alone. Figures have the settings of this module
+and matplotlib's defaults: neither a user's matplotlibrc nor a backend for windows or notebooks has a say.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow.steady.quantities import QUANTITIES, Scales
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Colours of Okabe & Ito (2008), dark ones first; black is for lines that stand alone.
+BLACK, BLUE, VERMILION, GREEN, PURPLE = "#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+GREY = "#767676"
+
+SOLID: Any = "solid"
+DASHED: Any = (0, (5, 2))
+DOTTED: Any = (0, (1, 1.4))
+DASH_DOTTED: Any = (0, (6, 1.8, 1, 1.8))
+
+#: Strokes of the two kinds of density, as in figures 4 and 9.
+OF_DENSITY = {"inverted": SOLID, "monotonic": DASHED}
+
+_SERIF = "STIXGeneral"
+_SIZE = 9.0
+_WIDTH = 1.3
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Colour and dashes of a line."""
+
+    colour: str = BLACK
+    dashes: Any = SOLID
+
+    def line(self, width: float = _WIDTH) -> dict[str, Any]:
+        """The stroke as keyword arguments of ``plot``."""
+        # Dots need round ends and a little more width to print as dark as a line.
+        dotted = self.dashes == DOTTED
+        return {
+            "color": self.colour,
+            "linestyle": self.dashes,
+            "linewidth": width + 0.3 * dotted,
+            "solid_capstyle": "round",
+        }
+
+
+#: Strokes of consecutive lines; the first three are those of figure 2.
+STROKES = (
+    Stroke(VERMILION, SOLID),
+    Stroke(GREEN, DOTTED),
+    Stroke(BLUE, DASHED),
+    Stroke(PURPLE, DASH_DOTTED),
+    Stroke(BLACK, SOLID),
+    Stroke(GREY, DASHED),
+)
+
+
+@contextmanager
+def own_settings() -> Iterator[None]:
+    """matplotlib's defaults while a figure is made or written, whatever the settings are before and after.
+
+    It decorates functions too. Settings may ask for programs that are not there, such as LaTeX.
+    """
+    _import_matplotlib()
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams["svg.hashsalt"] = "chuteflow"  # the same names inside, whenever a picture is drawn
+        yield
+
+
+def _import_matplotlib() -> None:
+    """Import matplotlib where the environment names a backend that is not there, which would be an error."""
+    backend = os.environ.get("MPLBACKEND")
+    if "matplotlib" in sys.modules or backend is None:
+        return
+    os.environ["MPLBACKEND"] = "agg"
+    try:
+        import matplotlib
+    finally:
+        os.environ["MPLBACKEND"] = backend
+    with suppress(ValueError):
+        matplotlib.rcParams["backend"] = backend
+
+
+def stroke(index: int) -> Stroke:
+    """The stroke of line ``index``, from the start again after the last."""
+    return STROKES[index % len(STROKES)]
+
+
+def panels(
+    columns: int, rows: int = 1, *, width: float = 7.2, height: float = 2.7, shared_y: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """A figure of ``width`` by ``height`` inches with panels row by row, lettered (a), (b), ...
+
+    With ``shared_y`` the panels of a row have one ordinate.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = list(np.ravel(figure.subplots(rows, columns, sharey="row" if shared_y else False, squeeze=False)))
+    for index, ax in enumerate(axes):
+        _calm(ax)
+        if columns * rows > 1:
+            ax.set_title(f"({'abcdefghijkl'[index]})", loc="left", **title())
+    return figure, axes
+
+
+def title() -> dict[str, Any]:
+    """Settings of the letters of panels."""
+    return {"fontsize": _SIZE, "fontfamily": _SERIF}
+
+
+def inset(ax: Axes, place: tuple[float, float, float, float]) -> Axes:
+    """Small axes inside ``ax``: left, bottom, width and height as shares of it."""
+    small = ax.inset_axes(place)
+    _calm(small)
+    small.tick_params(labelsize=_SIZE - 2.0)
+    return small
+
+
+def label(name: str, scales: Scales | None = None) -> str:
+    """The label of an axis from the registry of quantities, with the unit where there are scales."""
+    quantity = QUANTITIES[name]
+    # A name in code has no hyphen.
+    name = name.replace("_", " ").replace("holdup", "hold-up")
+    words = f"{name}, ${quantity.latex}$"
+    return words if scales is None or quantity.unit == "1" else f"{words} ({printed(quantity.unit)})"
+
+
+def name_axes(ax: Axes, x: str | None, y: str | None) -> None:
+    """Label the axes; None leaves one without."""
+    for text, put in ((x, ax.set_xlabel), (y, ax.set_ylabel)):
+        if text is not None:
+            put(text, fontsize=_SIZE, fontfamily=_SERIF, math_fontfamily="stix")
+
+
+def name_point(ax: Axes, x: float, y: float, text: str, where: str = "above right") -> None:
+    """A filled point, and its name ``where``: words out of above, below, left and right."""
+    across, up = ("right" in where) - ("left" in where), ("above" in where) - ("below" in where)
+    ax.plot([x], [y], marker="o", markersize=4.0, color=BLACK, linestyle="none", zorder=4)
+    ax.annotate(
+        text,
+        (x, y),
+        (5.0 * across, 5.0 * up),
+        textcoords="offset points",
+        ha={1: "left", 0: "center", -1: "right"}[across],
+        va={1: "bottom", 0: "center", -1: "top"}[up],
+        fontsize=_SIZE,
+        fontfamily=_SERIF,
+        fontstyle="italic",
+    )
+
+
+def write(ax: Axes, x: float, y: float, text: str, **settings: Any) -> None:
+    """``text`` at a point of the axes; ``settings`` are those of matplotlib's ``annotate``."""
+    settings = {"fontsize": _SIZE - 1.0, "textcoords": "offset points", "xytext": (0.0, 0.0)} | settings
+    ax.annotate(text, (x, y), fontfamily=_SERIF, math_fontfamily="stix", **settings)
+
+
+def legend(ax: Axes | Figure, **settings: Any) -> None:
+    """A legend without a frame."""
+    settings = {"frameon": False, "handlelength": 2.8, "borderaxespad": 0.4, "labelspacing": 0.35} | settings
+    ax.legend(prop={"family": _SERIF, "size": _SIZE - 0.5, "math_fontfamily": "stix"}, **settings)
+
+
+def caption(figure: Figure, text: str) -> None:
+    """A line of small print above the panels."""
+    figure.suptitle(text, fontsize=_SIZE - 0.5, fontfamily=_SERIF, math_fontfamily="stix", color=GREY)
+
+
+def spread_scale(ax: Axes, axis: str, values: Sequence[Any]) -> None:
+    """A logarithmic ``axis`` ("x" or "y") where positive values span more than a decade and a half."""
+    flat = [value for part in values for value in np.ravel(part)]
+    if flat and min(flat) > 0.0 and max(flat) > 30.0 * min(flat):
+        logarithmic(ax, axis)
+
+
+def logarithmic(ax: Axes, axis: str) -> None:
+    """A logarithmic ``axis`` ("x" or "y"), whose numbers are text in the typeface of all others."""
+    from matplotlib.ticker import LogFormatter
+
+    class Powers(LogFormatter):
+        """Labels where matplotlib puts them: as plain numbers, or as powers of ten where some are large or small."""
+
+        def __call__(self, x: float, pos: Any = None) -> str:
+            if not super().__call__(x, pos):
+                return ""
+            low, high = self.axis.get_view_interval()  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
+            return f"{x:g}" if min(low, high) >= 5e-4 and max(low, high) <= 2e4 else power_of_ten(x)
+
+    ax.set(**{f"{axis}scale": "log"})
+    scaled = getattr(ax, f"{axis}axis")
+    scaled.set_major_formatter(Powers())
+    scaled.set_minor_formatter(Powers(labelOnlyBase=False))
+
+
+def power_of_ten(value: float) -> str:
+    """A positive number of one digit with its power raised, in the typeface of the text around it."""
+    digit, _, exponent = f"{value:.0e}".partition("e")
+    times = "" if digit == "1" else f"{digit}×"
+    return rf"$\mathdefault{{{times}10^{{{int(exponent)}}}}}$"
+
+
+def sentence(text: str) -> Figure:
+    """A figure that holds nothing but a sentence."""
+    figure, (ax,) = panels(1, height=1.2)
+    ax.set_axis_off()
+    ax.text(
+        0.5,
+        0.5,
+        textwrap.fill(text, 100),
+        transform=ax.transAxes,
+        ha="center",
+        va="center",
+        fontsize=_SIZE,
+        fontfamily=_SERIF,
+    )
+    return figure
+
+
+def printed(unit: str) -> str:
+    """A unit as it is printed, with powers raised."""
+    return re.sub(r"\^(\d)", r"$^{\1}$", unit)
+
+
+def _calm(ax: Axes) -> None:
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_linewidth(0.6)
+    ax.tick_params(labelsize=_SIZE - 1.0, width=0.6, length=3.0, labelfontfamily=_SERIF)
+    ax.tick_params(which="minor", labelsize=_SIZE - 2.5, width=0.5, length=2.0, labelfontfamily=_SERIF)
+    ax.margins(x=0.03, y=0.03)

@@ -1,0 +1,1 @@
+"""The paper's own method, Chebyshev series in a mapped height: second and independent."""

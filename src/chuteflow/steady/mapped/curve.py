@@ -1,0 +1,216 @@
+"""The curve of flows by the paper's method: its discretisation driven by the general continuation.
+
+The system is :class:`chuteflow.steady.mapped.solution.MappedSystem`, whose flux is free and whose inner product is that
+of the plane (ln S, ln Q), with S = T_inf on the half-line and S = H below an interface. A fold of Q, where
+two flows of one mass flux meet (section 3.5), is where d ln Q along the unit tangent changes its sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chuteflow.errors import InputError
+from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.continuation import Control, Monitor, Point, locate, trace
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
+from chuteflow.steady.flow import Flow
+from chuteflow.steady.mapped.solution import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
+from chuteflow.steady.solver import Condition, Status
+
+#: How a curve is followed; lengths are in the plane (ln S, ln Q). Points are solved again more closely.
+CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600)
+#: Range of T_surface followed unless another is asked for: few chutes are within reach of N = 400 below it.
+SURFACE_TEMPERATURE = (0.05, 100.0)
+#: Estimated relative error of Q, h and M up to which a flow is taken for one.
+TOLERANCE = 1e-8
+#: Relative error allowed in the flow from which a curve starts.
+_START_TOLERANCE = 1e-9
+#: Flows of a curve are at least so far apart: cold ones take many small steps, each with many coefficients.
+_SPACING = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class MappedPoint:
+    """A located point of a curve: ``kind`` is "fold-Q" or "density-inversion", ``position`` the index before it."""
+
+    kind: str
+    flow: MappedSolution
+    position: int
+
+
+@dataclass(frozen=True, eq=False)
+class MappedCurve:
+    """A family of flows in order along its curve, from hot to cold at the start.
+
+    All are converged to TOLERANCE. ``special`` are the flows of turning mass flux and at the onset of a density
+    inversion, in the same order; ``ends`` says in words why the curve ends at either side.
+    """
+
+    flows: tuple[MappedSolution, ...]
+    special: tuple[MappedPoint, ...]
+    ends: tuple[str, str]
+
+    @property
+    def folds(self) -> tuple[MappedSolution, ...]:
+        """The flows of turning mass flux."""
+        return tuple(point.flow for point in self.special if point.kind == "fold-Q")
+
+    @property
+    def mass_flux(self) -> Array:
+        """Q along the curve, (3.26)."""
+        return np.array([flow.mass_flux for flow in self.flows])
+
+    @property
+    def centre_of_mass(self) -> Array:
+        """h along the curve, (3.27)."""
+        return np.array([flow.centre_of_mass for flow in self.flows])
+
+    @property
+    def mass_holdup(self) -> Array:
+        """M along the curve, (3.27)."""
+        return np.array([flow.mass_holdup for flow in self.flows])
+
+    @property
+    def surface_temperature(self) -> Array:
+        """T_surface along the curve."""
+        return np.array([flow.surface_temperature for flow in self.flows])
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """What is met on one side of the start, kinds (empty for a plain flow) with flows, and why the side ends."""
+
+    met: list[tuple[str, MappedSolution]]
+    end: str
+
+
+def mapped_curve(
+    start: Flow | MappedSolution,
+    *,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    control: Control = CONTROL,
+) -> MappedCurve:
+    """The family through ``start``, to both sides, as far as it goes in a range of T_surface.
+
+    Args:
+        start: a flow of the family.
+        surface_temperature: lowest and highest T_surface; the last flow of a side is the first one outside.
+        control: how the curve is followed.
+
+    Raises:
+        InputError: for a range that does not hold the start.
+    """
+    low, high = surface_temperature
+    if not 0.0 < low < start.surface_temperature < high:
+        raise InputError(
+            f"surface temperatures from {low:g} to {high:g}: must be positive, and hold that of the start, "
+            f"{start.surface_temperature:g}"
+        )
+    condition = Condition.fix(LOG_T, start.surface_temperature)
+    first = refine(start.chute, start, condition, _START_TOLERANCE)
+    if not first.converged:
+        return MappedCurve((), (), (first.status.value, first.status.value))
+    bounds = (float(np.log(low)), float(np.log(high)))
+    hot, cold = (_side(first, direction, bounds, control) for direction in (1.0, -1.0))
+    met = [*hot.met[::-1], ("", first), *cold.met]
+    flows = tuple(flow for kind, flow in met if not kind)
+    return MappedCurve(flows, tuple(_special(met)), (hot.end, cold.end))
+
+
+def _special(met: Sequence[tuple[str, MappedSolution]]) -> Iterator[MappedPoint]:
+    before = -1
+    for kind, flow in met:
+        if kind:
+            yield MappedPoint(kind, flow, before)
+        else:
+            before += 1
+
+
+def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: Control) -> _Side:
+    """From ``first`` on, towards larger (1) or smaller (-1) S."""
+    degree = min(d for d in DEGREES if d >= min(first.degree, LARGEST_DEGREE))
+    system, matrix = first.system.transferred(degree, first.system.multiple)
+    z = matrix @ first.z
+    ahead = np.zeros(len(z))
+    ahead[-2] = direction
+    path = trace(system, z, direction=ahead, control=control)
+    met: list[tuple[str, MappedSolution]] = []
+    taken, previous = 0.0, None
+    for point in path:
+        if previous is not None and point.step > 0.0:
+            special = list(_between(previous, point, control))
+            met += special
+            if special or point.arclength > taken + _SPACING:
+                taken = point.arclength
+                flow = _as_flow(point)
+                end = _unresolved(flow)
+                if end:
+                    return _Side(met, end)
+                met.append(("", flow))
+                end = _outside(flow, bounds)
+                if end:
+                    return _Side(met, end)
+        previous = point
+    return _Side(met, path.status.value)
+
+
+def _between(
+    previous: Point[MappedSystem], point: Point[MappedSystem], control: Control
+) -> Iterator[tuple[str, MappedSolution]]:
+    """Kinds and flows of the special points of a step, as far as they are resolved."""
+    for kind, monitor in _MONITORS.items():
+        before, after = (monitor(p.z, p.tangent, p.system) for p in (previous, point))
+        if before * after < 0.0:
+            found = locate(previous, point, point.system, monitor, control=control)
+            flow = _as_flow(found.point)
+            if not found.status.failed and not _unresolved(flow):
+                yield kind, flow
+
+
+def _flux_slope(z: Array, tangent: Array, system: MappedSystem) -> float:
+    """d ln Q along the unit tangent."""
+    del z, system
+    return float(tangent[-1])
+
+
+def _density_excess(z: Array, tangent: Array, system: MappedSystem) -> float:
+    """Positive where the density is inverted."""
+    del tangent
+    return system.density_excess(z)
+
+
+_MONITORS: dict[str, Monitor[MappedSystem]] = {"fold-Q": _flux_slope, "density-inversion": _density_excess}
+
+
+def _unresolved(flow: MappedSolution) -> str:
+    """Why ``flow`` is not taken for one; empty where it is."""
+    if not np.isfinite(flow.error):
+        return Status.NO_CONVERGENCE.value
+    return "" if flow.error <= TOLERANCE else f"the series are not resolved with N = {LARGEST_DEGREE}"
+
+
+def _outside(flow: MappedSolution, bounds: tuple[float, float]) -> str:
+    """Why a side ends at ``flow``; empty where it goes on."""
+    if flow.macroscopic[LOG_T] >= bounds[1]:
+        return f"it goes on to surface temperatures above {np.exp(bounds[1]):g}"
+    if flow.macroscopic[LOG_T] <= bounds[0]:
+        return f"it goes on to surface temperatures below {np.exp(bounds[0]):g}"
+    return ""
+
+
+def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
+    """A point of a trace as a flow with its estimated error: solved again in a plane across the curve."""
+    system = point.system
+    _, _, macroscopic, gradient = system.evaluate(point.z)
+    along = gradient @ point.tangent
+    along[LOG_H] = 0.0
+    along /= np.linalg.norm(along)
+    plane = Condition((along[LOG_Q], 0.0, along[LOG_M], along[LOG_T]), float(along @ macroscopic))
+    near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, Status.CONVERGED, point.iterations)
+    flow = solve_mapped(system.chute, near, plane, system.degree, multiple=system.multiple)
+    if flow.error <= TOLERANCE or system.degree == LARGEST_DEGREE:
+        return flow
+    return refine(system.chute, near, plane, TOLERANCE, multiple=system.multiple)
