@@ -132,6 +132,9 @@ chute_options = _options(
     ),
     option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
     closure_options,
+    option(
+        "--base", metavar="NAME", help="Base: richman (the default), or johnson-jackson:specularity=0.5 and the like."
+    ),
 )
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
@@ -197,7 +200,7 @@ def words(given: Mapping[str, Any]) -> dict[str, str]:
     Raises:
         InputError: for parameters of the closure that are not KEY=VALUE.
     """
-    found = {name: given[name] for name in ("surface", "closure") if given[name] is not None}
+    found = {name: given[name] for name in ("surface", "closure", "base") if given.get(name) is not None}
     if given["settings"]:
         from chuteflow.theory.laws import settings_added
 

@@ -65,7 +65,8 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
 def chute_object(chute: Chute) -> dict[str, float | str]:
     """The parameters of a chute."""
     values = chute.as_dict()
-    return {short: values[name] for short, name in PARAMETERS.items()}
+    named = {short: values[name] for short, name in PARAMETERS.items()}
+    return named | ({"base": values["base"]} if "base" in values else {})
 
 
 def closure_object(chute: Chute, known: Law | None = None) -> dict[str, Any]:

@@ -224,6 +224,7 @@ def chute_from(kept: Mapping[str, Any]) -> Chute:
         InputError: for parameters out of range.
     """
     values = {name: kept["chute"][short] for short, name in PARAMETERS.items()}
+    values["base"] = kept["chute"].get("base", "richman")
     try:
         law(values["closure"])
     except InputError:

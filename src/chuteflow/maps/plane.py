@@ -19,6 +19,7 @@ from chuteflow.maps.fan import Base, Fan, fan
 from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 
@@ -89,6 +90,7 @@ class Plane:
         for x in (self.x.low, self.x.high):
             for y in (self.y.low, self.y.high):
                 corner = self.at(x, y)
+                require_richman(corner.base, "maps are")
                 require_limit(corner.law, corner.restitution, corner.slope, "maps need")
 
     def at(self, x: float, y: float) -> Chute:

@@ -9,6 +9,7 @@ from typing import Any
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.parameters import PARAMETERS
+from chuteflow.theory.bases import BASES, Base, base
 from chuteflow.theory.constitutive import Law, require_positive
 from chuteflow.theory.laws import law
 
@@ -28,6 +29,8 @@ class Chute:
         surface: "free" or "interface".
         closure: the constitutive law: its name, a text such as "extended:packing=0.64" or "grains.py:OWN" (see
             :mod:`chuteflow.theory.laws`), or a :class:`chuteflow.theory.constitutive.Law`.
+        base: the condition at the base, see :mod:`chuteflow.theory.bases`: its name, with parameters as in
+            "richman:diameter=1.5", or a :class:`chuteflow.theory.bases.Base`.
 
     Raises:
         InputError: for a value out of range, naming it, what was given and what is allowed.
@@ -39,10 +42,12 @@ class Chute:
     roughness: float
     surface: str = "free"
     closure: str | Law = "lun"
+    base: str | Base = "richman"
 
     def __post_init__(self) -> None:
         for name, parameter in PARAMETERS.items():
-            object.__setattr__(self, name, parameter.checked(getattr(self, name)))
+            check = base(self.base).checked_roughness if name == "roughness" else parameter.checked
+            object.__setattr__(self, name, check(getattr(self, name)))
         if self.surface not in SURFACES:
             raise InputError(f"unknown surface {self.surface!r}: choose one of {', '.join(SURFACES)}")
         if self.law.known:
@@ -70,7 +75,19 @@ class Chute:
         """The constitutive law that its closure means now."""
         return law(self.closure)
 
+    @property
+    def laws(self) -> str:
+        """Closure and base in words; the base of the paper goes without saying."""
+        on = base(self.base)
+        return f"closure {self.closure}" + ("" if on == BASES["richman"] else f", base {on}")
+
     def as_dict(self) -> dict[str, float | str]:
         """All parameters by name, the closure as a text."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return values | {"closure": str(self.closure)}
+        values["closure"] = str(self.closure)
+        on = base(self.base)
+        # The base of the paper goes without saying.
+        if on == BASES["richman"]:
+            del values["base"]
+            return values
+        return values | {"base": str(on)}

@@ -161,7 +161,7 @@ class State:
             + by_rise * (laden - 1.0) * (self.rise + model.beta)
         )
         out[..., 0, :] = y_z[..., 0, :]
-        base = model.slope * model.slip_slope(df[..., -1])
+        base = model.base_flux_slope(df[..., -1])
         out[..., -1, :] = y_z[..., -1, :]
         out[..., -1, :n] += base[..., None] * problem.accumulate[..., -1, :]
         out[..., -1, n] += base

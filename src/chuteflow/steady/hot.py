@@ -17,6 +17,7 @@ from chuteflow import display
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Field
 from chuteflow.theory.hot import (
     LAMBDA_C,
@@ -125,6 +126,7 @@ def hot(chute: Chute) -> HotModel:
     """
     if chute.surface != "free":
         raise InputError(f"surface = {chute.surface!r}: the model of hot flows has the surface 'free' alone")
+    require_richman(chute.base, "the hot limit is")
     limit = dilute(chute.law, chute.restitution, chute.slope)
     parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     reason = parameters.obstacle

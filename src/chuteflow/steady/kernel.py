@@ -101,7 +101,8 @@ def _assemble(
 ) -> float:  # fmt: skip
     """Residuals and derivatives of all elements, condensed; the macroscopic quantities and their derivatives.
 
-    ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, and beta; ``ends`` (N+1, 2) theta
+    ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, beta and
+    the factor of GRIP in the loss; ``ends`` (N+1, 2) theta
     and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta,
     y and mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
@@ -202,8 +203,10 @@ def _assemble(
     flux = carried + glide
     if not (flux > 0.0 and moment > 0.0):
         return math.inf
-    by_ends[0, count, 2] = slope * slip - chute[3]  # heat flux that the base gives, and its derivative to ln x
-    by_ends[1, count, 2] = slope * slip * slip_x
+    by_ends[0, count, 2] = (
+        slope * slip - chute[3] - chute[8] * f[GRIP]
+    )  # heat flux that the base gives, and its derivative to ln x
+    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + GRIP]
     by_ends[0, count, 0] = carried * (0.5 * (1.0 - f[8 + GAMMA]) - slip_x) / flux
     by_ends[1, count, 0] = 0.0
     by_ends[0, 0, 2] = (glide_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux

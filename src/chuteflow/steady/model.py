@@ -34,6 +34,7 @@ from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
+from chuteflow.theory.bases import BASES, Base, base
 from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
@@ -61,14 +62,14 @@ def _argument(c: Array) -> Array:
     return OFFSET * np.expm1(np.expm1(c))
 
 
-def closure_table(closure: Law, e: float, slope: float) -> Table:
-    """The eight functions of x for ``closure``."""
-    return _closure_table(closure, e, slope if closure.knows_slope else 0.0)
+def closure_table(closure: Law, e: float, slope: float, on: Base = BASES["richman"]) -> Table:
+    """The eight functions of x for ``closure``; the two of the base for that of the kind of ``on``."""
+    return _closure_table(closure, e, slope if closure.knows_slope else 0.0, BASES[on.name])
 
 
 # Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
-def _closure_table(chosen: Law, e: float, slope: float) -> Table:
+def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
     b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
     scaled_breaks = np.array([nu / (1.0 - nu / chosen.densest) for nu in breaks])
@@ -87,7 +88,7 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
         gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(room) + np.log(r.compressibility))
         return np.stack(
-            [r.conduction * (1.0 - b), k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1
+            [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + np.log(room), gamma], axis=-1
         )
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
@@ -153,7 +154,9 @@ class Model:
     table: Table
     surface_stress: float
     surface_flux: float
+    base: Base
     base_loss: float
+    loss_by_second: float
     slip_of_empty_base: float
     beta: float
 
@@ -178,7 +181,7 @@ class Model:
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
-        return boundary.slip_coefficient(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
+        return self.base.slip(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
 
     def slip_slope(self, slopes: Array) -> Array:
         """Derivative of F1, given those of the closures: F1 is affine in them."""
@@ -186,7 +189,13 @@ class Model:
 
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
-        return self.slope * self.slip(closures) - self.base_loss
+        flux = self.slope * self.slip(closures) - self.base_loss
+        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[GRIP]
+
+    def base_flux_slope(self, slopes: Array) -> Array:
+        """Derivative of the flux that the base gives, given those of the closures: it is affine in them."""
+        slope = self.slope * self.slip_slope(slopes)
+        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[GRIP]
 
     @cached_property
     def kinks(self) -> Array:
@@ -204,14 +213,15 @@ class Model:
 
     @cached_property
     def constants(self) -> Array:
-        """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of shear and grip, beta, (8,)."""
+        """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of the two functions of the base,
+        beta, and the factor of the second function in the loss, (9,)."""
         unit = np.zeros((8, 2))
         unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
         by_shear, by_grip = self.slip_slope(unit)
         return np.array(
             [
                 self.slope, self.surface_stress, self.surface_flux, self.base_loss,
-                self.slip_of_empty_base, by_shear, by_grip, self.beta,
+                self.slip_of_empty_base, by_shear, by_grip, self.beta, self.loss_by_second,
             ]
         )  # fmt: skip
 
@@ -244,7 +254,9 @@ def _registered(chute: Chute, chosen: Law) -> Model:
             f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
             "take a larger e, the surface interface or the Fourier form of the closure"
         )
-    return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope))
+    return _model(
+        chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, base(chute.base))
+    )
 
 
 def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
@@ -257,7 +269,7 @@ def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Mode
     at = _parameters(chute) | {parameter: value}
     beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
     chosen = chute.law
-    stepped = closure_table(chosen, beyond["restitution"], beyond["slope"])
+    stepped = closure_table(chosen, beyond["restitution"], beyond["slope"], base(chute.base))
     table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
     return _model(chute, chosen, at, table), _model(chute, chosen, beyond, stepped)
 
@@ -268,6 +280,8 @@ def _parameters(chute: Chute) -> dict[str, Any]:
 
 def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) -> Model:
     slope, roughness = parameters["slope"], parameters["roughness"]
+    on = base(chute.base)
+    loss, loss_by_second = on.loss(parameters["wall_restitution"], roughness)
     return Model(
         chute=chute,
         law=chosen,
@@ -276,7 +290,9 @@ def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) 
         table=table,
         surface_stress=boundary.surface_stress(chute.surface),
         surface_flux=boundary.surface_flux(chute.surface, slope),
-        base_loss=boundary.base_loss(parameters["wall_restitution"], roughness),
+        base=on,
+        base_loss=loss,
+        loss_by_second=loss_by_second,
         beta=beta_of(dilute_drift(chosen, parameters["restitution"], slope)),
-        slip_of_empty_base=np.asarray(boundary.slip_coefficient(np.zeros(()), np.zeros(()), roughness, slope)).item(),
+        slip_of_empty_base=np.asarray(on.slip(np.zeros(()), np.zeros(()), roughness, slope)).item(),
     )

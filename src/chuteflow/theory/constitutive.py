@@ -185,7 +185,7 @@ class Reduced:
     - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
     - ``grip`` = A g1/g2, of the slip condition (3.16);
-    - ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
+    - ``radial`` = g0, ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
     """
 
     conduction: Field
@@ -195,6 +195,7 @@ class Reduced:
     work: Field
     shear: Field
     grip: Field
+    radial: Field
     compressibility: Field
     stiffness: Field
 
@@ -220,6 +221,7 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
         grip=big_g * nu_contact / g.viscosity,
+        radial=g.radial,
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
     )

@@ -126,7 +126,7 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
     yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
     others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
     said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
-    yield f"chute: {said}, surface {found.chute.surface}, closure {found.chute.closure}"
+    yield f"chute: {said}, surface {found.chute.surface}, {found.chute.laws}"
     for i, boundary in enumerate(found, 1):
         yield ""
         yield f"boundary {i} of {len(found)}, {len(boundary.flows)} points"

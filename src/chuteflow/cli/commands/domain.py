@@ -147,7 +147,7 @@ def _report(found: Domain) -> Iterator[str]:
         for key, parameter in BY_KEY.items()
         if parameter.name not in (x.name, y.name)
     ]
-    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, closure {plane.chute.closure}"
+    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, {plane.chute.laws}"
     yield ""
     rows = [["", "value", "share of the plane"]]
     parts = shares(found)
