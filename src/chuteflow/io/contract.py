@@ -31,9 +31,9 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
         "chute": chute_object(flow_set.chute),
         "flows": [flow_object(flow, scales) for flow in flow_set],
         "searched": searched_object(flow_set.chute, flow_set.searched, scales),
-        "closure": closure_object(flow_set.chute, flow_set[0].law if len(flow_set) else None),
         "reason": flow_set.reason,
         "incomplete": flow_set.incomplete,
+        "closure": closure_object(flow_set.chute, flow_set[0].law if len(flow_set) else None),
         **_units(scales, NUMBERS),
     }
 

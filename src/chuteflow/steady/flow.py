@@ -236,6 +236,7 @@ class Flow:
             slip_ratio=float(self._model.slip(state.f[:, -1])),
             knudsen_number=MEAN_FREE_PATH / float(per_grain @ contacts) / self.centre_of_mass,
             density_turns=self._density_turns,
+            dense_limit=chosen.dense_limit,
         )
 
     @property

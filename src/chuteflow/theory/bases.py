@@ -1,6 +1,6 @@
 """The registry of bases: conditions at the bottom of a flow, with their parameters.
 
-# notation: r roughness, e_w wall restitution, s slope, y = q/(p sqrt(T)) heat flux; G = g1/nu, g0 and others of table 1.
+# notation: r roughness, e_w wall restitution, s slope, y = q/(p sqrt(T)) heat flux; G = g1/nu, g0, ... of table 1.
 
 A base gives the slip velocity F1 sqrt(T) and the heat flux y = s F1 - loss, with F1 and loss affine in two functions of
 the density, which are tabulated with the law. So wall restitution, roughness and the parameters of the base change

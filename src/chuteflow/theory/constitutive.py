@@ -30,6 +30,9 @@ from chuteflow.errors import InputError
 #: An array of values at given states.
 Field = NDArray[Any]
 
+#: Volume fraction above which grains form clusters and chains, and dissipation is less than of single collisions
+#: (Jenkins 2007).
+CLUSTERED = 0.49
 #: Contact value in Richman's A(nu): d = d_w in (2.12).
 WALL_CONTACT = np.pi / (12.0 * np.sqrt(2.0))
 
@@ -107,6 +110,11 @@ class Law:
     def known(self) -> bool:
         """Whether its function is at hand."""
         return not isinstance(self.coefficients, Unknown)
+
+    @property
+    def dense_limit(self) -> float:
+        """The volume fraction up to which the law is meant."""
+        return getattr(self.coefficients, "dense_limit", CLUSTERED)
 
     @property
     def smooth(self) -> bool:

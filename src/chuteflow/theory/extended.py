@@ -78,6 +78,11 @@ class Extended(Formula):
         """Whether there are no breaks at any e and slope."""
         return super().smooth and self.length == "none"
 
+    @property
+    def dense_limit(self) -> float:
+        """The length accounts for clusters and chains: up to the densest packing."""
+        return super().dense_limit if self.length == "none" else self.densest
+
     def _without_length(self, nu: Field, room: Field, e: float) -> Coefficients:
         g0, log_slope = self.radial_at(nu, room)
         x = nu * g0

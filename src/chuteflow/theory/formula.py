@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
-from chuteflow.theory.constitutive import Coefficients, Field
+from chuteflow.theory.constitutive import CLUSTERED, Coefficients, Field
 from chuteflow.theory.friction import FRICTIONS, effective_restitution
 from chuteflow.theory.radial import Radial, radial
 
@@ -66,6 +66,11 @@ class Formula:
     def smooth(self) -> bool:
         """Whether there are no breaks at any e and slope."""
         return not self._radial.breaks
+
+    @property
+    def dense_limit(self) -> float:
+        """The volume fraction up to which the law is meant: above, grains form clusters and chains."""
+        return CLUSTERED
 
     def radial_at(self, nu: Field, room: Field) -> tuple[Field, Field]:
         """g0 and g0'/g0."""
