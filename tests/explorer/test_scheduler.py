@@ -275,6 +275,12 @@ def test_a_computation_that_cannot_be_interrupted_costs_the_process(worker):
     assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] != process
 
 
+def test_an_interrupt_that_compiled_code_turns_into_another_error_is_still_one(worker):
+    process = said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"]
+    assert worker.put(object(), "map", does("other error"), Limits(0.1, 10.0)) is Ended.TOO_LONG
+    assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] == process
+
+
 def test_workers_do_without_what_other_systems_lack(compute, monkeypatch):
     monkeypatch.setenv("WITHOUT_POSIX", "1")
     worker = Worker(nice=5, compute=compute)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -37,6 +37,12 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 #: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
+#: So near where the rough quantity turns, since a fold is not known as well; it turns where it is nearest to the value
+#: within the second length along the branch, and further away by the third to both sides.
+_NEAR_TURN, _AROUND, _RISE = 0.03, 0.15, 0.01
+#: A rough branch that is not longer, and as near to another, may be a piece of that one: where the residual is near to
+#: zero all along, its signs are not known well enough to join them.
+_SHORT, _BESIDE = 0.15, 0.15
 #: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
 #: least the second; and there by more than so many times of what the rough flow was wrong by.
 _STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
@@ -61,11 +67,15 @@ _REMEMBERED = 4
 class Family:
     """A branch of flows in a range: rough flows in order, of which any are solved on request.
 
-    ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3.
+    ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3. ``pieces`` are short branches near to this one which
+    may belong to it: the place of the nearest rough flow here, and their rough quantities. Such a piece is not
+    ``separate``.
     """
 
     rough: RoughBranch
     within: Range
+    pieces: tuple[tuple[int, Array], ...] = ()
+    separate: bool = True
 
     @property
     def macroscopic(self) -> Array:
@@ -205,7 +215,25 @@ class Family:
 @lru_cache(maxsize=_REMEMBERED)
 def families(model: Model, within: Range) -> tuple[Family, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
-    return tuple(Family(branch, within) for branch in search(model, within).branches if len(branch) > 1)
+    found = [Family(branch, within) for branch in search(model, within).branches if len(branch) > 1]
+    pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
+    separate = [True] * len(found)
+    for i, short in enumerate(found):
+        if short.arclength[-1] > _SHORT:
+            continue
+        nearest = [
+            (float(apart.min()), k, int(apart.min(axis=0).argmin()))
+            for k, other in enumerate(found)
+            if other.arclength[-1] > _SHORT
+            for apart in [np.linalg.norm(short.macroscopic[:, None] - other.macroscopic, axis=-1)]
+        ]
+        distance, k, place = min(nearest, default=(np.inf, 0, 0))
+        if distance < _BESIDE:
+            pieces[k].append((place, short.macroscopic))
+            separate[i] = False
+    return tuple(
+        replace(f, pieces=tuple(p), separate=alone) for f, p, alone in zip(found, pieces, separate, strict=True)
+    )
 
 
 def search(model: Model, within: Range) -> TrajectoryGrid:
@@ -254,16 +282,34 @@ def crossings(
     near = np.abs(off) < rough + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
+    near[_turns_near(off, family.arclength)] = True
+    for place, piece in family.pieces:
+        there = piece[:, which] - target
+        if np.abs(there).min() < _NEAR_TURN or (there >= 0.0).any() != (off[place] >= 0.0):
+            near[place] = True
     found: list[Solution] = []
     lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
         single = _solve_single(family, which, target, off, begin, end, tolerance)
         solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
-        if solved is None:
+        if solved is None and family.separate:
             lost += [m[i] for i in changes.tolist() if begin <= i < end]
-        else:
-            found += solved
+        found += solved or []
     return found, lost
+
+
+def _turns_near(off: Array, arclength: Array) -> list[int]:
+    """Rough flows at which a quantity comes nearest to its value, and turns."""
+    away = np.abs(off)
+    found = []
+    for i in np.flatnonzero(away < _NEAR_TURN).tolist():
+        first = int(np.searchsorted(arclength, arclength[i] - _AROUND))
+        last = int(np.searchsorted(arclength, arclength[i] + _AROUND, side="right"))
+        before, after = away[first:i], away[i + 1 : last]
+        least = min(before.min(initial=np.inf), after.min(initial=np.inf))
+        if least >= away[i] and min(before.max(initial=0.0), after.max(initial=0.0)) > away[i] + _RISE:
+            found.append(i)
+    return found
 
 
 def _is_behind(point: Point, last: Point) -> bool:
@@ -438,6 +484,6 @@ def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[Trace
         pieces = family.traced(tolerance)
         found += pieces
         inside = [m for m in family.macroscopic if within.contains(m)]
-        if len(inside) > 1 and not pieces:
+        if len(inside) > 1 and not pieces and family.separate:
             lost.append(inside[len(inside) // 2])
     return found, lost

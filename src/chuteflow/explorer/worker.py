@@ -234,6 +234,11 @@ class _Watch:
         except _Interrupt as interrupt:
             self._busy.clear()
             return interrupt.why
+        except Exception:
+            # Compiled code that is interrupted as it is loaded turns that into another error.
+            if self._due is not None and self._due[0] == number:
+                return self._due[1]
+            raise
 
     def _heard(self, *_: object) -> None:
         if self._busy.is_set() and self._due is not None and self._due[0] == self._number:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -87,7 +87,7 @@ def tabulate(
 ) -> Table:
     """Interpolate ``function`` (x of shape (k,) to (k, m)) on each piece at Chebyshev points; it may have kinks or
     jumps at the ascending ``breaks``, where pieces meet."""
-    points = np.sin(np.pi * np.arange(-degree, degree + 1, 2) / (2 * (degree + 1)))
+    points, fit = _chebyshev_fit(degree)
     checks = np.array([-0.97, 0.31])
     edges = edges_at(breaks, lower, upper, pieces)
     width: Any = (upper - lower) / pieces
@@ -98,16 +98,21 @@ def tabulate(
     local = np.concatenate([points, checks])
     x = middles[:, None] + 0.5 * np.reshape(width, (-1, 1)) * local
     values = np.asarray(function(x.ravel())).reshape(pieces, len(local), -1)
-    vandermonde = chebyshev.chebvander(points, degree)
-    to_powers = np.zeros((degree + 1, degree + 1))
-    for k in range(degree + 1):
-        powers = chebyshev.cheb2poly(np.eye(degree + 1)[k])
-        to_powers[: len(powers), k] = powers
-    fit = to_powers @ np.linalg.inv(vandermonde)
     coefficients = np.einsum("kj,pjm->kpm", fit, values[:, : degree + 1])
     check = np.einsum("ck,kpm->pcm", checks[:, None] ** np.arange(degree + 1), coefficients)
     error = np.abs(check - values[:, degree + 1 :]).max(axis=(0, 1))
     return Table(lower, upper, _with_slopes(coefficients, width), error, tuple(breaks))
+
+
+@lru_cache(maxsize=8)
+def _chebyshev_fit(degree: int) -> tuple[Array, Array]:
+    """Chebyshev points on [-1, 1] (degree+1,), and the powers of the interpolant for values there, a matrix."""
+    points = np.sin(np.pi * np.arange(-degree, degree + 1, 2) / (2 * (degree + 1)))
+    to_powers = np.zeros((degree + 1, degree + 1))
+    for k in range(degree + 1):
+        powers = chebyshev.cheb2poly(np.eye(degree + 1)[k])
+        to_powers[: len(powers), k] = powers
+    return points, to_powers @ np.linalg.inv(chebyshev.chebvander(points, degree))
 
 
 def antiderivative(table: Table) -> Table:
