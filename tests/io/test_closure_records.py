@@ -65,3 +65,18 @@ def test_parameters_and_bases_come_back_to_the_last_bit(tmp_path, suffix):
     for one, other in zip(found, again, strict=True):
         assert one.mass_flux == other.mass_flux
         assert one.largest_volume_fraction == other.largest_volume_fraction
+
+
+def test_to_load_a_file_runs_no_other(tmp_path):
+    source = tmp_path / "grains.py"
+    source.write_text("from chuteflow.theory.extended import EXTENDED as OWN\n")
+    chute = Chute(**CHUTE, closure=f"{source}:OWN")
+    path = tmp_path / "flows.json"
+    chuteflow.save(chuteflow.flows(chute, Q=3.0), path)
+    # A law that was asked for in this process is known again.
+    assert chuteflow.load(path).chute.law.known
+    other = tmp_path / "other.py"
+    other.write_text("raise SystemExit('it ran')\n")
+    path.write_text(path.read_text().replace("grains.py", "other.py"))
+    with pytest.raises(InputError, match="checksum"):
+        chuteflow.load(path)

@@ -30,7 +30,7 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import Solution, Status, checked_tolerance
 from chuteflow.theory.constitutive import Law, Unknown, fingerprint
-from chuteflow.theory.laws import law
+from chuteflow.theory.laws import law, runs_code
 
 #: What can be saved and loaded, and its names in the files.
 Result = Flow | FlowSet | Curve
@@ -218,17 +218,22 @@ def _breaks(kept: Any) -> tuple[float, ...]:
 
 
 def chute_from(kept: Mapping[str, Any]) -> Chute:
-    """The chute of the head of a file, with a law without a function where its own is not registered here.
+    """The chute of the head of a file, with a law without a function where its own is not registered here, or is in a
+    Python file that was not asked for in this process.
 
     Raises:
         InputError: for parameters out of range.
     """
     values = {name: kept["chute"][short] for short, name in PARAMETERS.items()}
     values["base"] = kept["chute"].get("base", "richman")
+    described = isinstance(kept.get(CLOSURE), Mapping)
     try:
+        # To read a file must not run another that it names.
+        if described and runs_code(values["closure"]):
+            values["closure"] = _unknown_law(kept[CLOSURE])
         law(values["closure"])
     except InputError:
-        if not isinstance(kept.get(CLOSURE), Mapping):
+        if not described:
             raise
         values["closure"] = _unknown_law(kept[CLOSURE])
     return Chute(**values)

@@ -82,6 +82,12 @@ def in_folder(asked: str, folder: Path) -> str:
     return settings_added(f"{folder / file}:{name}", tuple(f"{key}={value}" for key, value in settings.items()))
 
 
+def runs_code(asked: str) -> bool:
+    """Whether :func:`law` would run a file for the first time: nothing that is read may make it do so."""
+    where, _ = _parts(asked)
+    return _is_in_file(where) and str(Path(where.rpartition(":")[0]).resolve()) not in _RUN
+
+
 def known_laws() -> dict[str, Law]:
     """All laws by name, with those of other packages.
 
@@ -157,6 +163,10 @@ def _in_file(where: str) -> Law:
     return replace(found, spec=where)
 
 
+#: Files that were run in this process.
+_RUN: set[str] = set()
+
+
 @lru_cache(maxsize=32)
 def _module(path: str, stamp: tuple[int, int]) -> Any:
     """The module in a file; imported anew where the file has changed."""
@@ -171,6 +181,7 @@ def _module(path: str, stamp: tuple[int, int]) -> Any:
     sys.path.insert(0, folder)
     try:
         spec.loader.exec_module(module)
+        _RUN.add(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the file may raise anything
         del sys.modules[name]
         raise InputError(f"closure file {path} cannot be imported: {_reason(error)}") from None

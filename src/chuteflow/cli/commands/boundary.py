@@ -133,7 +133,7 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         yield _points(boundary, second)
     yield ""
     if found.reason:
-        yield f"no boundary: {found.reason}"
+        yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
@@ -142,6 +142,8 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
         "neither come near, could be missed"
     )
+    if found.incomplete:
+        yield f"there may be more: {found.incomplete}"
     if found.skipped:
         yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 
