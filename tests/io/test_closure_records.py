@@ -1,6 +1,7 @@
 """Files of flows under laws that are not registered where they are read."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -9,7 +10,7 @@ from chuteflow import Chute, InputError
 from chuteflow.theory.extended import EXTENDED
 from chuteflow.theory.laws import LAWS
 
-CHUTE = {"slope": 0.3, "restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
+CHUTE: dict[str, Any] = {"slope": 0.3, "restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def test_a_file_loads_without_its_law_and_says_where_that_is_needed(found, monke
     path = tmp_path / f"flows{suffix}"
     chuteflow.save(found, path)
     monkeypatch.delitem(LAWS, "own")
-    again = chuteflow.load(path)
+    again: Any = chuteflow.load(path)
     assert [flow.mass_holdup for flow in again] == [flow.mass_holdup for flow in found]
     assert "not registered here" in repr(again[0])
     for ask in (
@@ -58,7 +59,7 @@ def test_parameters_and_bases_come_back_to_the_last_bit(tmp_path, suffix):
     assert len(found)
     path = tmp_path / f"flows{suffix}"
     chuteflow.save(found, path)
-    again = chuteflow.load(path)
+    again: Any = chuteflow.load(path)
     assert str(again.chute.closure) == "extended:packing=0.64"
     assert again.chute.law == chute.law
     assert str(again.chute.base) == "richman:diameter=1.2"
@@ -74,7 +75,8 @@ def test_to_load_a_file_runs_no_other(tmp_path):
     path = tmp_path / "flows.json"
     chuteflow.save(chuteflow.flows(chute, Q=3.0), path)
     # A law that was asked for in this process is known again.
-    assert chuteflow.load(path).chute.law.known
+    again: Any = chuteflow.load(path)
+    assert again.chute.law.known
     other = tmp_path / "other.py"
     other.write_text("raise SystemExit('it ran')\n")
     path.write_text(path.read_text().replace("grains.py", "other.py"))

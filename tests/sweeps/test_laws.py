@@ -83,6 +83,21 @@ def test_studies_of_the_papers_laws_stay_what_they_were(path):
     assert from_canonical(study.canonical).digest == study.digest
 
 
+def test_points_on_other_bases(path):
+    bases = ["richman", "richman:diameter=1.2", "johnson-jackson:specularity=0.2"]
+    path.write_text(STUDY[: STUDY.index("closure")] + f"base = {bases}\n".replace("'", '"'))
+    study = read(path)
+    assert from_canonical(study.canonical).digest == study.digest
+    solved = solve_chunk(study, 0)
+    assert solved.singly >= 4
+    for i in range(study.points):
+        base = bases[int(solved.parameters["base"][i])]
+        found = flows(Chute(float(solved.parameters["slope"][i]), 0.8, 0.8, 0.6, base=base), Q=3.0)
+        assert solved.n_flows[i] == len(found)
+        got = solved.quantities["mass_holdup"][i, : len(found)]
+        np.testing.assert_allclose(got, [flow.mass_holdup for flow in found], rtol=1e-7)
+
+
 @pytest.mark.parametrize("closure", ["grains.py:NONE", "missing.py:OWN", "extended:packing=9", "unheard-of"])
 def test_a_law_that_is_not_there_is_named(path, closure):
     path.write_text(STUDY[: STUDY.index("closure")] + f'closure = "{closure}"\n')

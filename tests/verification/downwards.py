@@ -62,7 +62,7 @@ def carried(law, e, slope, state, p, end, surface_stress, rtol):
                 def crossing(p, state, level=level):
                     return state[0] - level
 
-                crossing.terminal = True
+                vars(crossing)["terminal"] = True
                 events.append(crossing)
         stop = end
         if len(events) < len(levels):

@@ -213,7 +213,7 @@ def _iterated(start: Elements, weights: Array, value: float, step: float, *, rou
     if not start.model.kinks.size:
         return start.iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
     places = kinks.crossings(start)
-    distance = np.inf
+    distance, found = np.inf, None
     for _ in range(_MOST_ROUNDS):
         found = kinks.with_ends(start, places).iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
         if not np.isfinite(found.step):
@@ -223,6 +223,7 @@ def _iterated(start: Elements, weights: Array, value: float, step: float, *, rou
         # Rounding leaves more of a distance where the density hardly changes.
         if distance < kinks.MEETS or (distance < kinks.NEAR and distance > 0.1 * before):
             return found
+    assert found is not None
     return replace(found, step=np.inf)
 
 

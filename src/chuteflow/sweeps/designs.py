@@ -104,7 +104,7 @@ class Design:
 
 
 #: Parameters that take other words than those that have a number of their own.
-OPEN = ("closure",)
+OPEN = ("closure", "base")
 
 
 def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], str]]) -> Axis:

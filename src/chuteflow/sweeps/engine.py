@@ -23,6 +23,7 @@ from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
 from chuteflow.sweeps.study import RANGES, Study
+from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
 
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
@@ -67,7 +68,12 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     valid = _valid(study, out.parameters, failures)
     out.status[~valid] = Status.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
-    singly = 0
+    # Lanes side by side have the base of the paper.
+    other = _on_other_bases(study, out.parameters) & valid
+    singly = int(other.sum())
+    for point in np.flatnonzero(other).tolist():
+        _fill_singly(study, out, point, failures)
+    valid &= ~other
     for closure, surface, members in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)
         solved = _solved(study, batch, out.parameters[study.condition][members])
@@ -227,6 +233,12 @@ def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
         out.quantities[name][where] = values[kept]
 
 
+def _on_other_bases(study: Study, parameters: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which points have another base than that of the paper."""
+    others = [i for i, one in enumerate(study.bases) if one != BASES["richman"]]
+    return np.isin(parameters["base"], others) if others else np.zeros(len(parameters["slope"]), dtype=bool)
+
+
 def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str]) -> None:
     """Solve one point by the search of :func:`chuteflow.flows`."""
     p = out.parameters
@@ -235,7 +247,7 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     condition = {study.condition: float(p[study.condition][point])}
     try:
         found = search(
-            Chute(slope, e, ew, roughness, surface, closure),
+            Chute(slope, e, ew, roughness, surface, closure, study.bases[int(p["base"][point]) if "base" in p else 0]),
             **condition,
             tolerance=study.tolerance,
             surface_temperature=study.surface_temperature,

@@ -62,6 +62,7 @@ _LONG_NAMES = {
     **{key: parameter.description for key, parameter in BY_KEY.items()},
     "surface": "surface condition",
     "closure": "constitutive law",
+    "base": "condition at the base",
     **{key: f"{condition.description} asked for" for key, condition in CONDITIONS.items()},
 }
 

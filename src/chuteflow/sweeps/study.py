@@ -32,6 +32,7 @@ from chuteflow.sweeps.designs import (
     shown_path,
 )
 from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
+from chuteflow.theory.bases import BASES, Base, base
 from chuteflow.theory.constitutive import Law, digest
 from chuteflow.theory.laws import in_folder, law
 
@@ -43,7 +44,9 @@ RANGES = {key: (parameter.low, parameter.highest) for key, parameter in BY_KEY.i
     key: (condition.low, condition.high) for key, condition in CONDITIONS.items()
 }
 #: Names, and what they are where a study does not give them. Other closures of a study are numbered after these.
-WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun")}
+WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun"), "base": (("richman",), "richman")}
+#: Those that a study without them does not have at all, as those of earlier versions.
+_OPTIONAL = ("base",)
 #: Restitution and slope at which values of a law are taken, by which it is known again.
 _KNOWN_BY = (0.9, 0.3)
 #: Kinds of a flow that can be kept beside the numbers of the registry.
@@ -82,8 +85,9 @@ class Study:
     canonical: str = field(default="", compare=False)
     #: Lists of values that are too long for the canonical form, by the name of their parameter.
     columns: Mapping[str, Column] = field(default_factory=dict, compare=False, repr=False)
-    #: The laws in the order of their numbers, and the folder to which those of files are relative.
+    #: The laws and the bases in the order of their numbers, and the folder to which those of files are relative.
     laws: tuple[Law, ...] = field(default=(), compare=False, repr=False)
+    bases: tuple[Base, ...] = field(default=(BASES["richman"],), compare=False, repr=False)
     folder: Path = field(default_factory=Path, compare=False, repr=False)
 
     @property
@@ -182,7 +186,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
         axes = {name: axis_from(name, value, WORDS) for name, value in parameters.items()}
     condition = _checked_names(axes)
     for name, (_, default) in WORDS.items():
-        if name not in axes:
+        if name not in axes and name not in _OPTIONAL:
             axes[name] = axis_from(name, default, WORDS)
     if kind != "list":
         for axis in axes.values():
@@ -212,6 +216,8 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     columns = {name: _column(name, value) for name, value in parameters.items() if _is_long(value)}
     object.__setattr__(study, "columns", columns)
     object.__setattr__(study, "folder", folder.absolute())
+    if "base" in axes:
+        object.__setattr__(study, "bases", tuple(_base(name) for name in axes["base"].words))
     object.__setattr__(study, "laws", tuple(_law(name, folder) for name in axes["closure"].words))
     object.__setattr__(study, "canonical", _canonical(study, kind, head, {**parameters, **columns}))
     return study
@@ -225,7 +231,7 @@ def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Map
         "design": {"kind": kind, **settings},
         # In their order, in which the points are counted.
         "parameters": {n: _plain(v) for n, v in parameters.items()}
-        | {n: d for n, (_, d) in WORDS.items() if n not in parameters},
+        | {n: d for n, (_, d) in WORDS.items() if n not in (*parameters, *_OPTIONAL)},
         "search": {
             "tolerance": study.tolerance,
             "surface_temperature": list(study.surface_temperature),
@@ -244,6 +250,13 @@ def _law(name: str, folder: Path) -> Law:
         return law(in_folder(name, folder))
     except InputError as error:
         raise InputError(f"parameters.closure: {error}") from None
+
+
+def _base(name: str) -> Base:
+    try:
+        return base(name)
+    except InputError as error:
+        raise InputError(f"parameters.base: {error}") from None
 
 
 def _closures(study: Study) -> dict[str, Any]:

@@ -156,7 +156,7 @@ class Law:
         Raises:
             InputError: for one that is not between 0 and the densest packing.
         """
-        own = getattr(self.coefficients, "breaks", self.breaks)
+        own: Any = getattr(self.coefficients, "breaks", self.breaks)
         places = own(e, slope) if callable(own) else own
         for nu in places:
             if not 0.0 < nu < self.densest:

@@ -10,6 +10,7 @@ In a fully developed flow S = g1 s/g2, a function of nu and the slope. The other
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class Extended(Formula):
         if self.length == "none" or self.loss_restitution(e) == 1.0:
             return tuple(sorted(points))
 
-        def excess(scaled: Field) -> Field:
+        def excess(scaled: Any) -> Any:
             room = 1.0 / (1.0 + scaled / self.densest)
             nu = scaled * room
             plain = self._without_length(nu, room, e)

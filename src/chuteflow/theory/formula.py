@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass, fields
+from typing import Any
 
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
@@ -76,7 +77,7 @@ class Formula:
         """g0 and g0'/g0."""
         return self._radial.function(nu, room, self.densest)
 
-    def loss_restitution(self, e: Field) -> Field:
+    def loss_restitution(self, e: Any) -> Any:
         """The restitution in the dissipation, with friction.
 
         Raises:
