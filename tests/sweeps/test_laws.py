@@ -5,6 +5,7 @@ import pytest
 
 from chuteflow import Chute, InputError, flows
 from chuteflow.sweeps.engine import solve_chunk
+from chuteflow.sweeps.outcome import Reason
 from chuteflow.sweeps.store import Store
 from chuteflow.sweeps.study import from_canonical, read
 
@@ -96,6 +97,15 @@ def test_points_on_other_bases(path):
         assert solved.n_flows[i] == len(found)
         got = solved.quantities["mass_holdup"][i, : len(found)]
         np.testing.assert_allclose(got, [flow.mass_holdup for flow in found], rtol=1e-7)
+
+
+def test_why_there_is_no_flow_is_not_said_by_a_hot_limit_that_is_none(path):
+    text = STUDY[: STUDY.index("closure")].replace("[0.29, 0.3]", "0.42") + 'closure = ["lun", "garzo-dufty"]\n'
+    path.write_text(text)
+    solved = solve_chunk(read(path), 0)
+    assert solved.n_flows.tolist() == [0, 0]
+    assert solved.reason[0] == Reason.TOO_STEEP_FOR_HOT_FLOWS_NO_OTHER_FOUND
+    assert solved.reason[1] == Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
 
 
 @pytest.mark.parametrize("closure", ["grains.py:NONE", "missing.py:OWN", "extended:packing=9", "unheard-of"])

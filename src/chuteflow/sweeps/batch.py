@@ -81,6 +81,12 @@ class Batch:
         """p_S."""
         return boundary.surface_stress(self.surface)
 
+    @property
+    def has_limit(self) -> NDArray[np.bool_]:
+        """Whether the temperature of the law has a limit far above, (n,)."""
+        nothing = np.zeros(len(self))
+        return reduce(self.law, nothing, cast(Any, self.restitution), cast(Any, self.slope)).drift == 0.0
+
     def along(self, state: Array) -> Along:
         """Everything pointwise at states (ROWS, n)."""
         return Along(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])

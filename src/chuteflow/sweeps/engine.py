@@ -73,6 +73,7 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     singly = int(other.sum())
     for point in np.flatnonzero(other).tolist():
         _fill_singly(study, out, point, failures)
+    out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
     valid &= ~other
     for closure, surface, members in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)

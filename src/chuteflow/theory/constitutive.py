@@ -236,9 +236,12 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
 
 
 def dilute_drift(law: Law, e: float, slope: float) -> Any:
-    """b, the limit of -nu g4/g3 where dilute: 0 but for laws whose g4 grows like 1/nu."""
+    """b, the limit of -nu g4/g3 where dilute, for one e or many: 0 but for laws whose g4 grows like 1/nu."""
     _, _, g = law.at(np.zeros(1), e, slope)
-    return 0.0 if g.density_flux is None else (-g.density_flux / g.conductivity)[0]
+    if g.density_flux is None:
+        return 0.0
+    b = -g.density_flux / g.conductivity
+    return b if np.ndim(e) else b[0]
 
 
 def require_limit(law: Law, e: float, slope: float, what: str) -> None:
