@@ -170,8 +170,8 @@ class Elements:
 
     def halved(self) -> Elements:
         """The same polynomials on elements of half the length."""
-        halves = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
-        return Elements(self.model, self.stretch, *halves, self.log_mass)
+        breaks, ends, slopes = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
+        return Elements(self.model, self.stretch, breaks, ends, slopes, self.log_mass)
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a

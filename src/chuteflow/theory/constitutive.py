@@ -157,7 +157,7 @@ class Law:
             InputError: for one that is not between 0 and the densest packing.
         """
         own: Any = getattr(self.coefficients, "breaks", self.breaks)
-        places = own(e, slope) if callable(own) else own
+        places: Any = own(e, slope) if callable(own) else own
         for nu in places:
             if not 0.0 < nu < self.densest:
                 raise InputError(
