@@ -106,3 +106,10 @@ def test_flows_where_the_residual_is_near_to_zero_all_along_are_found(condition,
     found = flows(chute, **{condition: value})
     assert len(found) == 4
     assert found.incomplete is None
+
+
+def test_flows_beside_a_fold_in_the_surface_temperature_that_the_search_saw_elsewhere_are_found():
+    chute = Chute(0.3935197336569905, 0.7707341874124249, 0.5386050915592441, 0.7664872639067919)
+    found = flows(chute, T_surface=1.8593081146840105)
+    assert [f.mass_holdup for f in found] == pytest.approx([2.946825, 2.953381], rel=1e-6)
+    assert abs(found[0].mass_holdup / found[1].mass_holdup - 1.0) > 1e-3

@@ -139,29 +139,33 @@ class Family:
     def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
-        it.
+        it, and goes away from it beyond, so that a fold near to the target lies between.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
 
-        def agrees(i: int) -> Point | None:
-            point = self.solved(i, tolerance)
-            off = self.macroscopic[i, which] - target
-            return point if point is not None and (point.m[which] >= target) == (off >= 0.0) else None
-
-        def outermost(places: list[int]) -> tuple[int, Point]:
-            found = next(((i, point) for i in places if (point := agrees(i)) is not None), None)
-            if found is None:
+        def tried(places: list[int], outward: float) -> tuple[int, Point]:
+            """The first that is on its side, where the quantity goes away from the target outwards; or is on its
+            side at least."""
+            second = None
+            for i in places:
+                point, off = self.solved(i, tolerance), float(self.macroscopic[i, which]) - target
+                if point is None or (point.m[which] >= target) != (off >= 0.0):
+                    continue
+                if outward * point.tangent[which] * (1.0 if off >= 0.0 else -1.0) > 0.0:
+                    return i, point
+                second = second or (i, point)
+            if second is None:
                 raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
-            return found
+            return second
 
         # Outwards, and from an end of the branch inwards.
         whole, middle = len(self.macroscopic) - 1, (begin + end) // 2
         sign = -1 if begin > 0 else 1
-        begin, first = outermost([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle])
+        begin, first = tried([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle], -1.0)
         sign = 1 if end < whole else -1
-        end, last = outermost([i for k in _OTHERS if middle < (i := end + sign * k) <= whole])
+        end, last = tried([i for k in _OTHERS if middle < (i := end + sign * k) <= whole], 1.0)
         inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
@@ -276,10 +280,7 @@ def crossings(
     target = float(np.log(value))
     m = family.macroscopic
     off = m[:, which] - target
-    bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
-    spacing = np.diff(family.arclength, prepend=0.0)
-    rough = NEAR + _PER_SPACING * np.maximum(spacing, np.append(spacing[1:], 0.0))
-    near = np.abs(off) < rough + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    near = np.abs(off) < _doubt_of(off, family.arclength)
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
     near[_turns_near(off, family.arclength)] = True
@@ -296,6 +297,19 @@ def crossings(
             lost += [m[i] for i in changes.tolist() if begin <= i < end]
         found += solved or []
     return found, lost
+
+
+def _doubt_of(off: Array, arclength: Array) -> Array:
+    """By how much a rough quantity (k,) may be wrong at its places, and reach further between them: most where it
+    turns, since the fold lies between two places."""
+    steps, lengths = np.diff(off), np.maximum(np.diff(arclength), 1e-300)
+    spacing = np.maximum(np.append(0.0, lengths), np.append(lengths, 0.0))
+    bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
+    slope = np.concatenate([[0.0, 0.0], np.abs(steps) / lengths, [0.0, 0.0]])
+    steepest = np.max([slope[i : i + len(off)] for i in range(4)], axis=0)
+    turns = np.concatenate([[False], (steps[1:] >= 0.0) != (steps[:-1] >= 0.0), [False]])
+    bends = np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    return NEAR + _PER_SPACING * spacing + bends + np.where(turns, steepest * spacing, 0.0)
 
 
 def _turns_near(off: Array, arclength: Array) -> list[int]:

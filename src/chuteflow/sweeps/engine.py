@@ -36,8 +36,8 @@ _FAILURES = (ChuteflowError, ArithmeticError, ValueError, LookupError)
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """The points of a chunk: ``parameters`` by name (n,), ``status``, ``reason`` and ``n_flows`` (n,), ``error`` and
-    the ``quantities`` (n, flows); ``failures`` says of the points that failed why, and ``singly`` how many points
-    were solved one by one."""
+    the ``quantities`` (n, flows); ``failures`` says of the points that failed why. So many points were solved
+    one by one: ``winding`` since trajectories wind there, ``singly`` for other reasons."""
 
     parameters: Mapping[str, Array]
     status: Flags
@@ -47,6 +47,7 @@ class Chunk:
     quantities: Mapping[str, NDArray[Any]]
     failures: Mapping[int, str]
     singly: int
+    winding: int
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """All arrays by the names that they have in a store."""
@@ -70,20 +71,25 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     out.reason[~valid] = Reason.NO_ANSWER
     # Lanes side by side have the base of the paper.
     other = _on_other_bases(study, out.parameters) & valid
-    singly = int(other.sum())
+    singly, winding = int(other.sum()), 0
     for point in np.flatnonzero(other).tolist():
         _fill_singly(study, out, point, failures)
     out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
     valid &= ~other
     for closure, surface, members in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)
-        solved = _solved(study, batch, out.parameters[study.condition][members])
-        _fill(study, out, members, solved)
-        for lane in np.flatnonzero(solved.unsettled).tolist():
-            singly += 1
-            _fill_singly(study, out, int(members[lane]), failures)
+        # Surface temperatures that are given are followed down one by one; no family of flows has to be found.
+        winds = batch.winding() if study.condition != "T_surface" else np.zeros(len(batch), dtype=bool)
+        others = np.flatnonzero(~winds)
+        solved = _solved(study, batch.take(others), out.parameters[study.condition][members[others]])
+        _fill(study, out, members[others], solved)
+        for point in [*members[winds].tolist(), *members[others[solved.unsettled]].tolist()]:
+            _fill_singly(study, out, point, failures)
+        winding += int(winds.sum())
+        singly += int(solved.unsettled.sum())
         _fill_reasons(out, batch, members)
-    return Chunk(**{**vars(out), "failures": {first + i: why for i, why in sorted(failures.items())}, "singly": singly})
+    told = {first + i: why for i, why in sorted(failures.items())}
+    return replace(out, failures=told, singly=singly, winding=winding)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
@@ -100,6 +106,7 @@ def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
         },
         failures={},
         singly=0,
+        winding=0,
     )
 
 
