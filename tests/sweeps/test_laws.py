@@ -1,5 +1,7 @@
 """Studies with laws of files, with parameters and with breaks."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from chuteflow import Chute, InputError, flows
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.outcome import Reason
 from chuteflow.sweeps.store import Store
-from chuteflow.sweeps.study import from_canonical, read
+from chuteflow.sweeps.study import from_canonical, from_dict, read
 
 LAW = """
 from dataclasses import replace
@@ -106,6 +108,16 @@ def test_why_there_is_no_flow_is_not_said_by_a_hot_limit_that_is_none(path):
     assert solved.n_flows.tolist() == [0, 0]
     assert solved.reason[0] == Reason.TOO_STEEP_FOR_HOT_FLOWS_NO_OTHER_FOUND
     assert solved.reason[1] == Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+
+
+def test_a_chunk_all_of_whose_points_wind_is_solved():
+    study = from_dict(
+        {"parameters": {"slope": [0.42], "e": 0.8, "ew": 0.8, "roughness": 0.6, "Q": 3.0}, "design": {"kind": "list"}},
+        Path(),
+    )
+    solved = solve_chunk(study, 0)
+    assert solved.winding == 1
+    assert solved.n_flows.tolist() == [0]
 
 
 @pytest.mark.parametrize("closure", ["grains.py:NONE", "missing.py:OWN", "extended:packing=9", "unheard-of"])

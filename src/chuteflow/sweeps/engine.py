@@ -183,7 +183,7 @@ class _Solved:
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
     are judged, or the law has breaks, at which integration side by side would lose its order."""
-    if wanted(study.quantities) or not batch.law.smooth:
+    if not len(batch) or wanted(study.quantities) or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
