@@ -37,7 +37,7 @@ class Commands(click.Group):
         """The command of this name."""
         if cmd_name not in COMMANDS:
             return None
-        return import_module(f"chuteflow.cli.commands.{cmd_name}").command
+        return import_module(f"chuteflow.cli.commands.{cmd_name.replace('-', '_')}").command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

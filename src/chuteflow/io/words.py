@@ -61,7 +61,7 @@ def chute(chute: Chute) -> str:
     """All parameters of ``chute``."""
     slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
     numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
-    return f"chute: {numbers}, {_SURFACES[chute.surface]}, closure {chute.closure}"
+    return f"chute: {numbers}, {_SURFACES[chute.surface]}, {chute.laws}"
 
 
 def scales(scales: Scales) -> str:

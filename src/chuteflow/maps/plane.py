@@ -19,9 +19,9 @@ from chuteflow.maps.fan import Base, Fan, fan
 from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
-from chuteflow.theory.constitutive import Law
+from chuteflow.theory.bases import require_richman
+from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
-from chuteflow.theory.laws import law
 
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
 #: for. All but the first two are 1 where there are such flows, else 0.
@@ -89,7 +89,9 @@ class Plane:
             raise InputError(f"both axes are {self.x.name}: give two parameters")
         for x in (self.x.low, self.x.high):
             for y in (self.y.low, self.y.high):
-                self.at(x, y)
+                corner = self.at(x, y)
+                require_richman(corner.base, "maps are")
+                require_limit(corner.law, corner.restitution, corner.slope, "maps need")
 
     def at(self, x: float, y: float) -> Chute:
         """The chute at values of the two parameters."""
@@ -137,7 +139,7 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
-    return kinds(_fan(plane, replace(chute, **_neutral(plane)), law(chute.closure)), Base.of(chute))
+    return kinds(_fan(plane, replace(chute, **_neutral(plane)), chute.law), Base.of(chute))
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:
@@ -147,7 +149,7 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
     """
     chute = plane.chute_at(outer, inner)
-    closure = law(chute.closure)
+    closure = chute.law
     limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
     found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     gained, lost = found.F21 > 0.0, found.delta > 0.0

@@ -85,6 +85,19 @@ def apply(function: Callable[[Field], Field], number: Any) -> list[Any]:
     return [FirstOrder(v, s[..., None] * number.slope) for v, s in zip(values, slopes, strict=True)]
 
 
+def apply_two(function: Callable[[Field, Field], Field], one: Any, other: Any) -> list[Any]:
+    """An analytic ``function`` of two numbers of one kind, each (m,), as k numbers: see :func:`apply`."""
+    if not isinstance(one, FirstOrder):
+        return list(function(one, other))
+    values = function(one.value, other.value)
+    by_one = derivative(function(stepped(one.value), other.value))
+    by_other = derivative(function(one.value, stepped(other.value)))
+    return [
+        FirstOrder(v, a[..., None] * one.slope + b[..., None] * other.slope)
+        for v, a, b in zip(values, by_one, by_other, strict=True)
+    ]
+
+
 def exp(number: Any) -> Any:
     """The exponential."""
     if not isinstance(number, FirstOrder):

@@ -18,6 +18,7 @@ from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.kinds import INVERTED, MONOTONIC, interior_kind
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Field
 from chuteflow.theory.hot import (
     LAMBDA_C,
@@ -29,7 +30,6 @@ from chuteflow.theory.hot import (
     hot_solution,
     slope_bounds,
 )
-from chuteflow.theory.laws import law
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,8 @@ def hot(chute: Chute) -> HotModel:
     """
     if chute.surface != "free":
         raise InputError(f"surface = {chute.surface!r}: the model of hot flows has the surface 'free' alone")
-    limit = dilute(law(chute.closure), chute.restitution, chute.slope)
+    require_richman(chute.base, "the hot limit is")
+    limit = dilute(chute.law, chute.restitution, chute.slope)
     parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     reason = parameters.obstacle
     return HotModel(

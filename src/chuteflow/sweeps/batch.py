@@ -52,7 +52,7 @@ class Batch:
     @classmethod
     def of(
         cls,
-        closure: str,
+        closure: str | Law,
         surface: str,
         slope: Array,
         restitution: Array,
@@ -81,6 +81,12 @@ class Batch:
     def surface_stress(self) -> float:
         """p_S."""
         return boundary.surface_stress(self.surface)
+
+    @property
+    def has_limit(self) -> NDArray[np.bool_]:
+        """Whether the temperature of the law has a limit far above, (n,)."""
+        nothing = np.zeros(len(self))
+        return reduce(self.law, nothing, cast(Any, self.restitution), cast(Any, self.slope)).drift == 0.0
 
     def along(self, state: Array) -> Along:
         """Everything pointwise at states (ROWS, n)."""
@@ -127,7 +133,7 @@ class Along:
         self._batch, self._reduced = batch, r
         self.p, self.log_x, self.y = p, log_x, y
         self.nu = x * room
-        coupled = r.coupling * self.nu
+        coupled = r.drift
         stiff = r.stiffness + coupled
         self.coupling = coupled / stiff
         self.ease = 1.0 / (stiff * room)  # dL/dln x

@@ -64,14 +64,14 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     Raises:
         InputError: where the law has none, that is no finite and positive conductivity and viscosity.
     """
-    limit = law.coefficients(np.zeros(1), np.ones(1), e, slope)
-    grip = reduce(law, np.zeros(1), e, slope).grip
+    _, _, limit = law.at(np.zeros(1), e, slope)
     g20, g30, g40, g52 = (
         float(value[0])
         for value in (limit.viscosity, limit.conductivity, limit.density_conductivity, limit.dissipation)
     )
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
+    grip = reduce(law, np.zeros(1), e, slope).grip
     return Dilute(g20, g30, g40, g52, float(grip[0]) * g20)
 
 

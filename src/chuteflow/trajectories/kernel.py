@@ -3,7 +3,8 @@
 # notation: P overburden, p = P + p_S normal stress, L, y, a, k, net, b as in chuteflow.trajectories.tables;
 # A = (1 - k)/(2 a), c = 1 + k/2; B = y - b the residual of the base condition; tau = ln P + P/p_1 the step variable.
 
-With these, dL/dp = 1/p - y/a and dy/dp = net - A y^2 - c y/p. All arrays of a row are in the order of the curve.
+With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0
+for most laws. All arrays of a row are in the order of the curve.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from chuteflow.trajectories.tables import (
     BASE_ABOVE,
     BASE_HIGH,
     BASE_LOW,
+    BETA,
     COUPLED,
     CURVE_ABOVE,
     CURVE_HIGH,
@@ -73,7 +75,7 @@ def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, f
     inverse = values[i, INVERSE] + t * (values[i + 1, INVERSE] - values[i, INVERSE])
     k = values[i, COUPLED] + t * (values[i + 1, COUPLED] - values[i, COUPLED])
     net = values[i, NET] + t * (values[i + 1, NET] - values[i, NET])
-    v = p * y * inverse
+    v = p * y * inverse - values[0, BETA]
     return (1.0 - v) / p, net - y * (1.0 + 0.5 * (v + k * (1.0 - v))) / p
 
 
@@ -133,14 +135,17 @@ def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, rows: Any, 
 def _start(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, rows: Any, j: int) -> None:
     """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
-        half = 0.5 * values[0, NET]
-        big_l = math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
-        v = over**2 * half * look_up(values, big_l, INVERSE)
+        beta = values[0, BETA]
+        half = values[0, NET] / (2.0 - 0.5 * beta)
+        big_l = (1.0 + beta) * math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
+        v = over**2 * half * look_up(values, big_l, INVERSE) - beta
         net, k = look_up(values, big_l, NET), look_up(values, big_l, COUPLED)
-        rows[j, S_Y] = over * (half + (net - 2.0 * half) / 3.0 - half * (v + k * (1.0 - v)) / 6.0)
-        fraction = 1.0
+        share = 3.0 + 0.5 * beta
+        heating = v + k * (1.0 - v) + beta
+        rows[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
+        fraction = 1.0 / (1.0 - beta)
     else:
-        big_l = math.log(p_s) - theta_s
+        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
         l_p, y_p = _derivative(values, p_s, big_l, y_s)
         big_l += over * l_p
         rows[j, S_Y] = y_s + over * y_p
@@ -350,7 +355,8 @@ def carry(
         half_tau = _lengths(slope, p_s, p_1, overburden[row - 1], over, lengths) if row > 0 else 0.0
         for j in range(n):
             if row == 0 or in_series[j]:
-                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(theta[j]), start_at_most))
+                warmth = theta[j] / (1.0 + values[0, BETA])
+                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(warmth), start_at_most))
                 if row == 0 or in_series[j]:
                     _start(values, slope, p_s, y_s, theta[j], over, rows, j)
                     continue

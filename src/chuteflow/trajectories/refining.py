@@ -157,7 +157,7 @@ class TrajectoryGrid:
         log_mass, log_t = self.macroscopic[zero, 2:]
         mass, temperature = float(np.exp(log_mass)), float(np.exp(log_t))
         over = self.overburden[: len(back)]
-        theta = np.log(over + model.surface_stress) - back[:, 0]
+        theta = (1.0 + model.beta) * np.log(over + model.surface_stress) - back[:, 0]
         per_mass = (back[:, 1] - model.surface_flux) / over
         log_over = np.log(over)
         stretch = default_stretch(model, mass, temperature)
@@ -182,7 +182,7 @@ def carry_down(
     ``deepest``. Those of the last few chutes are remembered: one asks for other flows of the same chute next."""
     t = tables(model)
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
-    overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
+    overburden = _depths(model, t, coldest ** (1.0 / (1.0 + model.beta)), deepest, p_1, refinement.step)
     decades = np.log10(hottest / coldest)
     temperature = np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
     states, came_from, first, zeros, links, undecided, cells, status = kernel.carry(

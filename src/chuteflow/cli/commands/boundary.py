@@ -54,7 +54,7 @@ class Plane(click.ParamType):
 @options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
 @options.range_options("where it is the second parameter")
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options
 @options.output_options
@@ -122,14 +122,14 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
     yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
     others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
     said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
-    yield f"chute: {said}, surface {found.chute.surface}, closure {found.chute.closure}"
+    yield f"chute: {said}, surface {found.chute.surface}, {found.chute.laws}"
     for i, boundary in enumerate(found, 1):
         yield ""
         yield f"boundary {i} of {len(found)}, {len(boundary.flows)} points"
         yield _points(boundary, second)
     yield ""
     if found.reason:
-        yield f"no boundary: {found.reason}"
+        yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
@@ -138,6 +138,8 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
         "neither come near, could be missed"
     )
+    if found.incomplete:
+        yield f"there may be more: {found.incomplete}"
     if found.skipped:
         yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 

@@ -60,7 +60,7 @@ class Numbers(click.ParamType):
     "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
 @options.output_options
@@ -143,7 +143,7 @@ def _report(found: Domain) -> Iterator[str]:
         for key, parameter in BY_KEY.items()
         if parameter.name not in (x.name, y.name)
     ]
-    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, closure {plane.chute.closure}"
+    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, {plane.chute.laws}"
     yield ""
     rows = [["", "value", "share of the plane"]]
     parts = shares(found)

@@ -57,7 +57,6 @@ from chuteflow.steady.kinds import density_kind
 from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
-from chuteflow.theory.laws import law
 
 #: Most coefficients that :func:`refine` takes, less one.
 LARGEST_DEGREE = 400
@@ -230,7 +229,7 @@ class MappedSystem:
 
     def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> Local:
         """Functions of the fields at points; arguments may be complex, for derivatives."""
-        chute, chosen = self.chute, law(self.chute.closure)
+        chute, chosen = self.chute, self.chute.law
         s, kappa = chute.slope, self.kappa
         per_scale = np.exp(-log_scale)
         mass, y2 = x * x, y * y
