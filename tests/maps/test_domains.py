@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, curve, domain, flows, hot
+from chuteflow.branches.counting import most_at_once
 from chuteflow.branches.ranges import Range
 from chuteflow.maps import CODES, exists_at
 from chuteflow.maps.columns import Part, alike
 from chuteflow.maps.fan import Base, fan
-from chuteflow.maps.kinds import _monotonic_pieces, _most
+from chuteflow.maps.kinds import _monotonic_pieces
 from chuteflow.maps.plane import code
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
@@ -258,8 +259,8 @@ def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
     assert (np.diff(log_q) > 0.0).all()
     assert (rise > 0.0).all()
     pieces = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
-    assert _most(pieces) == 3
-    assert _most(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
+    assert most_at_once(pieces) == 3
+    assert most_at_once(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
 
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():

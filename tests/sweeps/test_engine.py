@@ -11,12 +11,12 @@ from chuteflow import Chute, flows
 from chuteflow.errors import InputError, SolveError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES
+from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps import engine
 from chuteflow.sweeps.batch import Batch
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.marching import start
-from chuteflow.sweeps.numbers import DENSITIES, INTERIORS
 from chuteflow.sweeps.outcome import Reason, Status
 from chuteflow.sweeps.study import from_dict
 from chuteflow.theory.boundary import surface_stress

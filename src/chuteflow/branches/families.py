@@ -301,19 +301,20 @@ def crossings(
 
 def _doubt_of(off: Array, arclength: Array) -> Array:
     """By how much a rough quantity (k,) may be wrong at its places, and reach further between them: most where it
-    turns, since the fold lies between two places."""
+    turns before it is zero, since the fold lies between two places."""
     steps, lengths = np.diff(off), np.maximum(np.diff(arclength), 1e-300)
     spacing = np.maximum(np.append(0.0, lengths), np.append(lengths, 0.0))
     bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
     slope = np.concatenate([[0.0, 0.0], np.abs(steps) / lengths, [0.0, 0.0]])
     steepest = np.max([slope[i : i + len(off)] for i in range(4)], axis=0)
-    turns = np.concatenate([[False], (steps[1:] >= 0.0) != (steps[:-1] >= 0.0), [False]])
+    away = np.diff(np.abs(off)) >= 0.0
+    turns = np.concatenate([[False], away[1:] & ~away[:-1], [False]])
     bends = np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
     return NEAR + _PER_SPACING * spacing + bends + np.where(turns, steepest * spacing, 0.0)
 
 
 def _turns_near(off: Array, arclength: Array) -> list[int]:
-    """Rough flows at which a quantity comes nearest to its value, and turns."""
+    """Rough flows at which a quantity comes nearest to its value without passing it, and turns."""
     away = np.abs(off)
     found = []
     for i in np.flatnonzero(away < _NEAR_TURN).tolist():
@@ -321,7 +322,8 @@ def _turns_near(off: Array, arclength: Array) -> list[int]:
         last = int(np.searchsorted(arclength, arclength[i] + _AROUND, side="right"))
         before, after = away[first:i], away[i + 1 : last]
         least = min(before.min(initial=np.inf), after.min(initial=np.inf))
-        if least >= away[i] and min(before.max(initial=0.0), after.max(initial=0.0)) > away[i] + _RISE:
+        crossed = (off[first:last] >= 0.0).any() and (off[first:last] < 0.0).any()
+        if not crossed and least >= away[i] and min(before.max(initial=0.0), after.max(initial=0.0)) > away[i] + _RISE:
             found.append(i)
     return found
 

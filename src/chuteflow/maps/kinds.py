@@ -11,6 +11,7 @@ import numpy as np
 from contourpy import contour_generator
 from numpy.typing import NDArray
 
+from chuteflow.branches.counting import most_at_once
 from chuteflow.branches.rough_turns import dips
 from chuteflow.maps.fan import (
     EXCESS,
@@ -33,10 +34,11 @@ from chuteflow.maps.fan import (
     lagrange,
 )
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady import kinds as flow_kinds
 
 #: Bits of the kinds that are present among the flows of a chute.
-INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
-DENSITIES = {"monotonic": 1, "inverted": 2}
+INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
+DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
 #: Turns of ln Q along a family are told apart if they differ by more.
 _TURN = 1e-6
 #: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
@@ -91,7 +93,7 @@ def kinds(fan: Fan, base: Base) -> Kinds:
         holdup = np.exp(fields[LOG_MASS, part])
         interior |= _interiors(fields[:, part], zeros.doubt[:, part], holdup)
         density |= _densities(fields[:, part], zeros.doubt[2, part], holdup)
-    return Kinds(at, _most(np.concatenate(pieces)), len(chains), interior, density)
+    return Kinds(at, most_at_once(np.concatenate(pieces), _TURN), len(chains), interior, density)
 
 
 def _families(lines: list[Array]) -> list[Array]:
@@ -296,14 +298,6 @@ def _confirmed(stops: list[float], rises: float) -> list[float]:
     return stops
 
 
-def _most(pieces: Array) -> int:
-    """The largest number of stretches (pieces, 2) over one point."""
-    low, high = pieces.T
-    edges = np.concatenate([low + _TURN, high])
-    order = np.lexsort((np.repeat([1, 0], len(low)), edges))
-    return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
-
-
 def _interiors(fields: Array, doubt: Array, holdup: Array) -> int:
     """Bits of INTERIORS; a net loss whose sign is in ``doubt`` (2 or more, k) does not make a flow mixed."""
     found = 0
@@ -311,11 +305,11 @@ def _interiors(fields: Array, doubt: Array, holdup: Array) -> int:
     rounding = _BALANCE * scale * (1.0 + holdup / _DEEP)
     gain, loss = doubt[0] + rounding, doubt[1] + rounding
     if _peak(fields[NET_LOW] + gain) >= 0.0:
-        found |= INTERIORS["dissipative"]
+        found |= INTERIORS[flow_kinds.DISSIPATIVE]
     if _peak(loss - fields[NET_HIGH]) >= 0.0:
-        found |= INTERIORS["productive"]
+        found |= INTERIORS[flow_kinds.PRODUCTIVE]
     if _peak(np.minimum(-fields[SURE_LOW] - gain, fields[SURE_HIGH] - loss)) > 0.0:
-        found |= INTERIORS["mixed"]
+        found |= INTERIORS[flow_kinds.MIXED]
     return found
 
 
@@ -323,9 +317,9 @@ def _densities(fields: Array, doubt: Array, holdup: Array) -> int:
     """Bits of DENSITIES; a rise that is in ``doubt`` (k,) does not make a density inverted."""
     found = 0
     if _peak(1.0 - fields[STEEPEST]) >= 0.0:
-        found |= DENSITIES["monotonic"]
+        found |= DENSITIES[flow_kinds.MONOTONIC]
     if _peak(fields[SURE_STEEP] - doubt - 1.0 - _RISE * holdup) > 0.0:
-        found |= DENSITIES["inverted"]
+        found |= DENSITIES[flow_kinds.INVERTED]
     return found
 
 

@@ -97,7 +97,7 @@ class Overburden:
         return [curve(chute, surface_temperature=surface_temperature, points=points) for chute in chutes]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Mapped:
     """The paper's method (section 3.4). Curves of several chutes are shared out to ``workers`` processes, and kept
     in memory: several figures ask for the same ones."""

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.numerics.legendre import LobattoGrid, lobatto
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import stretch_map
@@ -43,8 +44,6 @@ DEGREE = 40
 FIELDS = 4
 #: Share of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
-#: Imaginary step of derivatives, far below rounding.
-_STEP = 1e-40
 #: Densities far above the base fall off to zero.
 _vanishing = np.errstate(under="ignore")
 
@@ -173,8 +172,7 @@ class Layer:
     @_vanishing
     def jacobian(self, state: Array) -> Array:
         """d rate/d state, exact (complex steps)."""
-        stepped: Any = state + _STEP * 1j * np.eye(len(state))
-        return self.rate(stepped).imag.T / _STEP
+        return derivative(self.rate(stepped(state, np.eye(len(state))))).T
 
     def growth_rates(self, state: Array) -> NDArray[np.complex128]:
         """Growth rates of small disturbances of a steady ``state``, fastest growing first; the mass is given.

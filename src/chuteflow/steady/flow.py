@@ -13,8 +13,10 @@ from chuteflow import display
 from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
+from chuteflow.numerics.roots import secants
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
+from chuteflow.steady.kinds import density_kind, interior_kind
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.names import name_of
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
@@ -198,15 +200,12 @@ class Flow:
         """ "dissipative" or "productive" throughout, or "mixed"."""
         net = self._samples["net"]
         # Net loss within rounding of zero decides nothing.
-        scale = 1e-12 * np.abs(net).max()
-        if net.min() >= -scale:
-            return "dissipative"
-        return "productive" if net.max() <= scale else "mixed"
+        return interior_kind(net.min(), net.max(), 1e-12 * np.abs(net).max())
 
     @property
     def density(self) -> str:
         """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
-        return "inverted" if self.density_excess > 0.0 else "monotonic"
+        return density_kind(self.density_excess)
 
     @cached_property
     def density_excess(self) -> float:
@@ -342,21 +341,13 @@ class Flow:
         k = int(np.argmax(nu))
         if k in (0, len(nu) - 1):
             return share[k : k + 1]
-        low, high = share[k - 1], share[k + 1]
         below, above = (float(self._samples["rise"][i] - 1.0) for i in (k - 1, k + 1))
-        middle = share[k]
-        # Secants within the bracket; an end that stays counts for half (the Illinois method).
-        for _ in range(50):
-            value = float(self._at_share(np.array([middle]))[0]["rise"][0] - 1.0)
-            if value < 0.0:
-                low, below, above = middle, value, 0.5 * above
-            else:
-                high, below, above = middle, 0.5 * below, value
-            # The density is flat there: half the digits of the place are all of its own.
-            if abs(value) < _LEVEL or not below < 0.0 < above:
-                break
-            middle = low - below * (high - low) / (above - below)
-        return np.array([middle])
+
+        def rise(at: float) -> float:
+            return float(self._at_share(np.array([at]))[0]["rise"][0] - 1.0)
+
+        # The density is flat there: half the digits of the place are all of its own.
+        return np.array([secants(rise, (share[k - 1], share[k + 1]), (below, above), share[k], _LEVEL)])
 
     @cached_property
     def _antiderivatives(self) -> tuple[Array, Array]:

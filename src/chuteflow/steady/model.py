@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.errors import InputError
+from chuteflow.numerics.complex_step import stepped
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
@@ -44,9 +45,6 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
 UPPER, _PIECES, _DEGREE = 4.2, 200, 7
-
-#: Step along the imaginary axis of :func:`model_along`; its square is lost in rounding.
-IMAGINARY_STEP = 1e-20
 
 
 def _coordinate(x: Array) -> Array:
@@ -262,16 +260,16 @@ def _registered(chute: Chute, chosen: Law) -> Model:
 def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
     """The continuous problem with one ``parameter`` of ``chute`` at ``value``, and that an imaginary step further.
 
-    The imaginary parts of what the second model gives, over :data:`IMAGINARY_STEP`, are exact derivatives with
-    respect to the parameter (J. N. Lyness and C. B. Moler 1967, SIAM J. Numer. Anal. 4, 202-210). The value may
-    lie a little beyond what a chute allows. ``parameter`` is one of PARAMETERS.
+    The imaginary parts of what the second model gives, over the step, are exact derivatives with respect to the
+    parameter (:mod:`chuteflow.numerics.complex_step`). The value may lie a little beyond what a chute allows.
+    ``parameter`` is one of PARAMETERS.
     """
     at = _parameters(chute) | {parameter: value}
-    beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
+    beyond: dict[str, Any] = at | {parameter: np.complex128(stepped(value))}
     chosen = chute.law
-    stepped = closure_table(chosen, beyond["restitution"], beyond["slope"], base(chute.base))
-    table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
-    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, stepped)
+    table_beyond = closure_table(chosen, beyond["restitution"], beyond["slope"], base(chute.base))
+    table = replace(table_beyond, coefficients=np.ascontiguousarray(table_beyond.coefficients.real))
+    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, table_beyond)
 
 
 def _parameters(chute: Chute) -> dict[str, Any]:

@@ -151,13 +151,24 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     weights = np.array([0.0, 0.0, 1.0, 0.0])
     if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
         weights = rates / np.linalg.norm(rates)
-    value = np.array(float(weights @ solution.macroscopic))
+    value = float(weights @ solution.macroscopic)
+    found, agrees = _on_grids(solution, weights, value)
+    if not agrees and solution.error > TOLERANCE:
+        # A flow that was asked for roughly: between the ends of its elements it has fewer digits than its integrals.
+        finer = solve(solution.elements.halved(), Condition(tuple(weights.tolist()), value), TOLERANCE)
+        if finer.converged:
+            found, _ = _on_grids(finer, weights, value)
+    return found
+
+
+def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[Collocation, Array], bool]:
+    """The problem on the grid that resolves a flow best and its unknowns, and whether its integrals are the flow's."""
     last: tuple[Collocation, Array] | None = None
-    resolved = False
+    agreed = resolved = False
     elements = solution.elements
     for problem, rough in elements.grids(kinks.crossings(elements)):
         found = newton(
-            lambda z, problem=problem: _system(problem.state(z), weights, value),
+            lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
             rough,
             tolerance=_STEP,
             longest_step=2.0,
@@ -166,12 +177,13 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
         agrees = found.converged and bool(off < max(_AGREES, solution.error))
         if agrees or last is None:
             last = problem, found.z if agrees else rough
+        agreed |= agrees
         # One grid more than it takes for the integrals: profiles want it.
         if agrees and resolved:
             break
         resolved = agrees
     assert last is not None
-    return last
+    return last, agreed
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.steady.flow import CUTOFF
+from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.sweeps.bases import Flows
-from chuteflow.sweeps.batch import FLUX, HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
+from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
 
 #: Names of kinds in the order of their flags.
-INTERIORS = ("dissipative", "mixed", "productive")
-DENSITIES = ("monotonic", "inverted")
 KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **JUDGED_KINDS}
 #: With which flows are looked at once more for what happens on the way to the base.
 _ACCURACY = Accuracy(1e-10, 1e-7)
-#: A trajectory that is so much elsewhere at the base when it is followed once more is too sensitive to be looked at.
-_SAME = 1e-7
 #: Net loss within this of zero, in its largest value on the way, decides nothing.
 _DECIDES = 1e-9
 
@@ -44,8 +39,6 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
     rest = set(names) - set(plain)
     if rest and flows.lane.size:
         inside = Inside(of, flows)
-        # Such numbers are not known here: the points are solved one by one.
-        unknown = np.where(inside.repeated, 0.0, np.nan)
         further: dict[str, Callable[[], Array]] = {
             "largest_volume_fraction": lambda: inside.largest,
             "depth": lambda: inside.depth,
@@ -53,7 +46,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
             "interior": lambda: inside.interior,
             "density": lambda: inside.inverted,
         }
-        out |= {name: value() + unknown for name, value in further.items() if name in rest}
+        out |= {name: value() for name, value in further.items() if name in rest}
     elif rest:
         out |= {name: np.empty(0) for name in rest}
     return out
@@ -83,21 +76,6 @@ class Inside:
         found = march(self._of, self._flows.temperature, self._ends, _ACCURACY, event)
         above = found.state[LOG_P] < self._flows.state[LOG_P, found.lane]
         return found.lane[above], found.state[:, above]
-
-    @cached_property
-    def _at_base(self) -> Array:
-        """States at the bases, from the start of the integration down (ROWS, n); NaN where one is not reached."""
-        base = self._flows.state[LOG_P]
-        whole = march(self._of, self._flows.temperature, self._ends, _ACCURACY, lambda at, i: np.log(at.p) - base[i])
-        out = np.full_like(self._flows.state, np.nan)
-        out[:, whole.lane] = whole.state
-        return out
-
-    @property
-    def repeated(self) -> NDArray[np.bool_]:
-        """Which flows come to the same base when they are followed once more."""
-        off = np.abs(self._at_base - self._flows.state)
-        return (off[LOG_X] < _SAME) & (off[FLUX] < _SAME)
 
     @property
     def inverted(self) -> Array:
@@ -131,7 +109,10 @@ class Inside:
         target = np.log(CUTOFF * self.largest)
         log_nu = self._first[LOG_X] - np.log1p(np.exp(self._first[LOG_X]) / self._of.law.densest)
         # z is counted from the start of the integration, and so is that of the base here.
-        bottom = self._at_base[HEIGHT]
+        base = self._flows.state[LOG_P]
+        whole = march(self._of, self._flows.temperature, self._ends, _ACCURACY, lambda at, i: np.log(at.p) - base[i])
+        bottom = np.full(len(self._of), np.nan)
+        bottom[whole.lane] = whole.state[HEIGHT]
         out = bottom - self._first[HEIGHT]
         lane, state = self._march(lambda at, lanes: np.log(at.nu) - target[lanes])
         # The first such place from the surface down; it is there unless the density begins above the target.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.quantities import NUMBERS, PLACE
@@ -66,10 +66,15 @@ def command(**given: Any) -> None:
     from chuteflow.bifurcations.boundary import boundary
 
     chosen = {name: given[option] for name, option in (("of", "of"), ("samples", "samples")) if given[option]}
-    found = boundary(
-        chute, second=BY_KEY[second].name, bounds=bounds, progress=_progress, **chosen, **options.search(given)
-    )
-    _clear()
+    with Progress() as progress:
+        found = boundary(
+            chute,
+            second=BY_KEY[second].name,
+            bounds=bounds,
+            progress=lambda what, share: progress.tell(f"{what}, {share:.0%} of the range"),
+            **chosen,
+            **options.search(given),
+        )
     if given["as_json"]:
         from chuteflow.io import contract
         from chuteflow.io.boundary_records import boundaries_object
@@ -84,9 +89,10 @@ def command(**given: Any) -> None:
         boundary_records.save(found, path)
 
     def plotted() -> Figure:
-        from chuteflow.plotting.boundary_plot import plot_boundaries
+        from chuteflow.bifurcations.diagram import diagram
+        from chuteflow.plotting.boundary_plot import plot_boundaries, plot_none
 
-        return plot_boundaries(found, _UPRIGHT[upright])
+        return plot_boundaries(diagram(found, _UPRIGHT[upright])) if len(found) else plot_none(found)
 
     options.deliver(given, answer, save, plotted)
 
@@ -108,16 +114,6 @@ def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], 
         got = "is missing" if bounds is None else f"is {bounds:g}"
         raise InputError(f"--{second} {got}: the second parameter takes a range LO:HI, for example 0.5:0.8")
     return bounds, options.chute({**given, second: bounds[0]})
-
-
-def _progress(what: str, share: float) -> None:
-    if sys.stderr.isatty():
-        click.echo(f"\r\x1b[K{what}, {share:.0%} of the range", nl=False, err=True)
-
-
-def _clear() -> None:
-    if sys.stderr.isatty():
-        click.echo("\r\x1b[K", nl=False, err=True)
 
 
 def _report(found: BoundarySet, second: str) -> Iterator[str]:

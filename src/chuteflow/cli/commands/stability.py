@@ -102,14 +102,14 @@ def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answe
 
 
 def _save(found: FlowSet, answers: Sequence[Answer], path: str) -> None:
-    from chuteflow.io import contract, stability_records
-    from chuteflow.io.writing import write_whole
+    from chuteflow.io import stability_records
+    from chuteflow.io.files import write_answer
 
-    if path.lower().endswith(".json"):
-        text = contract.text(stability_records.answers_object(found, answers, fields=True))
-    else:
-        text = "\n".join(",".join(row) for row in stability_records.csv_rows(answers))
-    write_whole(path, text + "\n")
+    write_answer(
+        path,
+        lambda: stability_records.answers_object(found, answers, fields=True),
+        lambda: stability_records.csv_rows(answers),
+    )
 
 
 def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:
