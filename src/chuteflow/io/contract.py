@@ -174,11 +174,11 @@ def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:
 
 def searched_object(chute: Chute, searched: Searched, scales: Scales | None = None) -> dict[str, Any]:
     """The range searched, and the cells of the search where they were counted."""
-    warmth = factor("surface_temperature", chute, scales)
+    scale = factor("surface_temperature", chute, scales)
     cells = searched.cells
     counted = {} if cells is None else {"delta": cells.delta, "cells": cells.number, "undecided": cells.undecided}
     return {
-        "T_surface": [finite(value * warmth) for value in searched.surface_temperature],
+        "T_surface": [finite(value * scale) for value in searched.surface_temperature],
         "M_max": finite(searched.largest_holdup * factor("mass_holdup", chute, scales)),
         **counted,
     }

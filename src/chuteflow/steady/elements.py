@@ -142,7 +142,7 @@ class Elements:
         return out
 
     def adapted(self, stretch: float) -> Elements:
-        """The same flow on elements chosen anew, with another stretch."""
+        """The same flow on new elements, with another stretch."""
         return self.blended(self, 0.0, stretch)
 
     def blended(self, other: Elements, fraction: float, stretch: float) -> Elements:

@@ -1,4 +1,4 @@
-"""``chuteflow claims``: every statement of the paper that can be tested, computed anew, with a verdict."""
+"""``chuteflow claims``: every statement of the paper that can be tested, computed, with a verdict."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def command(**given: Any) -> None:
 
         content = contract.curve_object(found, scales)
         if judged is not None:
-            from chuteflow.plotting.stability_curve import changes_objects, samples_objects
+            from chuteflow.io.stability_curve import changes_objects, samples_objects
 
             objects = samples_objects(judged, scales), changes_objects(judged, scales)
             for branch, samples, changes in zip(content["branches"], *objects, strict=True):
@@ -105,7 +105,7 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
     """Stable and unstable stretches of a family in words."""
-    from chuteflow.plotting.stability_curve import change_words, stretch
+    from chuteflow.io.stability_curve import change_words, stretch
 
     said = [stretch(run, found.chute, scales) for run in branch.runs]
     ends = [change_words(change, found.chute, scales) for change in branch.changes]
