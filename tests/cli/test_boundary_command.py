@@ -43,7 +43,7 @@ def test_everything_at_once(capsys, folds, tmp_path):
     printed = json.loads(out)
     assert printed == boundaries_object(folds) == json.loads(file.read_text())
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert printed.keys() == {"chute", "of", "in", "range", "boundaries", "searched", "reason"}
+    assert printed.keys() == {"chute", "of", "in", "range", "boundaries", "searched", "reason", "incomplete"}
     assert printed["chute"] == {
         "slope": None, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun",
     }  # fmt: skip

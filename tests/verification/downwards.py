@@ -73,14 +73,18 @@ def carried(law, e, slope, state, p, end, surface_stress, rtol):
     return state
 
 
-def base_flux(law, e, slope, wall_restitution, r, nu):
-    """F1 of (3.16), and F2 of (3.18) over g1, both reduced."""
+def base_flux(law, e, slope, wall_restitution, r, nu, diameter=1.0, specularity=None):
+    """F1 of (3.16), and F2 of (3.18) over g1, both reduced; or, with a specularity, those of Johnson & Jackson."""
     G, _, g2, *_ = closures(law, nu, e, slope)
     room = 1.0 - nu / law.densest
     g0 = float(law.coefficients(np.array([nu]), np.array([room]), e, slope).radial[0])
+    if specularity is not None:
+        f1 = slope * G / g0 * 6.0 * 0.62 / (math.pi * math.sqrt(3.0) * specularity)
+        return f1, slope * f1 - math.pi * math.sqrt(3.0) / (4.0 * 0.62) * (1.0 - wall_restitution**2) * g0 / G
     lid = math.sqrt(1.0 - r**2)
     kappa = 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)
-    bumps = 1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0))
-    f1 = slope / kappa * (math.sqrt(math.pi / 2.0) + (kappa - 0.5 * bumps * r**2) * nu * G / g2)
+    mean = 0.5 * (1.0 + diameter)
+    bumps = 1.0 + math.pi / (12.0 * math.sqrt(2.0) * mean) * (1.0 + 5.0 / (8.0 * nu * g0))
+    f1 = slope / kappa * (math.sqrt(math.pi / 2.0) + mean * (kappa - 0.5 * bumps * r**2) * nu * G / g2)
     loss = math.sqrt(2.0 / math.pi) * 2.0 * (1.0 - wall_restitution) / (1.0 + lid)
     return f1, slope * f1 - loss

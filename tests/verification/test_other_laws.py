@@ -31,6 +31,7 @@ LAWS_TRIED = [
     "garzo-dufty-fourier:radial=chialvo-sundaresan",
     "garzo-dufty",
 ]
+BASES = ["richman", "richman:diameter=1.1", "johnson-jackson:specularity=0.1", "johnson-jackson:specularity=0.6"]
 
 
 @pytest.mark.parametrize(("name", "flux"), FOUND)
@@ -44,14 +45,14 @@ def test_flows_are_those_of_an_independent_program(name, flux):
         assert mass == pytest.approx(known_mass, rel=1e-2)
 
 
-def assert_carried(flow, chosen, e_w, r, rtol):
+def assert_carried(flow, chosen, e_w, r, rtol, **on):
     """The flow is that of an integration down from its surface, and its base condition is met there."""
     chute = flow.chute
     e, slope = chute.restitution, chute.slope
     b = -float(reduce(chosen, np.zeros(1), e, slope).drift[0])
     state = downwards.down(chosen, e, slope, flow.surface_temperature, flow.mass_holdup, b / (1.0 - b))
     nu, T, q = math.exp(state[0]), math.exp(state[1]), state[2]
-    f1, f2 = downwards.base_flux(chosen, e, slope, e_w, r, nu)
+    f1, f2 = downwards.base_flux(chosen, e, slope, e_w, r, nu, **on)
     y = q / (flow.mass_holdup * math.sqrt(T))
     assert nu == pytest.approx(flow.base_volume_fraction, rel=rtol)
     assert flow.base_temperature == pytest.approx(T, rel=rtol)
@@ -102,16 +103,18 @@ def test_where_the_centre_of_mass_is_infinite_or_nothing_is_known_far_above_says
 
 
 @pytest.mark.slow
-def test_random_chutes_under_random_laws():
+def test_random_chutes_under_random_laws_on_random_bases():
     rng = np.random.default_rng(15)
     checked = 0
     for _ in range(200):
         name = LAWS_TRIED[rng.integers(len(LAWS_TRIED))]
-        e, e_w, r = rng.uniform(0.7, 0.98), rng.uniform(0.5, 1.0), rng.uniform(0.5, 0.86)
+        e, e_w, r = rng.uniform(0.7, 0.98), rng.uniform(0.5, 1.0), rng.uniform(0.53, 0.86)
         slope = rng.uniform(0.15, 0.5)
-        chute = Chute(slope, e, e_w, r, closure=name)
+        base = BASES[rng.integers(len(BASES))]
+        on = {key: float(value) for key, value in (part.split("=") for part in base.split(":")[1:])}
+        chute = Chute(slope, e, e_w, r, closure=name, base=base)
         for flow in flows(chute, M=float(rng.uniform(0.3, 3.0))):
             if flow.surface_temperature > 1e-2:
-                assert_carried(flow, law(name), e_w, r, 1e-8)
+                assert_carried(flow, law(name), e_w, r, 1e-8, **on)
                 checked += 1
     assert checked > 30

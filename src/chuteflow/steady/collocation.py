@@ -226,7 +226,8 @@ class State:
         raised = (1.0 + model.beta) * laden
         warmed = df[GAMMA] * raised - model.beta * laden  # d ln T / d ln M
         glide_move = (glide * (2.0 + 0.5 * warmed) + work_part * raised).sum(axis=-1)
-        slip_move = 1.0 + slip_log_x * raised[..., -1] + 0.5 * warmed[..., -1]
+        by_share = slip_log_x * (1.0 + model.beta) + 0.5 * (df[GAMMA][..., -1] * (1.0 + model.beta) - model.beta)
+        slip_move = 1.0 + by_share * laden[..., -1]
         out[..., LOG_Q, n + 1] = glide_move / flux + end * slip_move
         height_move = (heights * (2.0 - raised * (1.0 + df[DENSITY]))).sum(axis=-1)
         out[..., LOG_H, n + 1] = height_move / moment - 1.0
