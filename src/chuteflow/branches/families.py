@@ -27,6 +27,8 @@ _OTHERS = (0, 1, 2, 4, 8, 16)
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
+#: The same at larger hold-ups: there flows wind, and one between two others is a start only where these are near.
+_DEEP, _SPACING_DEEP = 5.0, 0.12
 #: Reaches over which the direction of a rough branch is looked for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
@@ -121,7 +123,9 @@ class Family:
                 weights = np.zeros(4)
                 weights[edge[0]], value = sign, sign * edge[1]
         point = point_at(self.rough.start(i), weights, value, tolerance)
-        if point is None or np.linalg.norm(point.m - self.macroscopic[i]) > _ROUGH + _ASTRAY * _SPACING + self._bend(i):
+        if point is None or np.linalg.norm(
+            point.m - self.macroscopic[i]
+        ) > _ROUGH + _ASTRAY * _SPACING_DEEP + self._bend(i):
             return None
         return point
 
@@ -201,16 +205,17 @@ class Family:
     def _spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
         length = self.arclength
-        least, most = _TOO_NEAR, _SPACING
+        spacing = np.where(self.macroscopic[:, LOG_M] > np.log(_DEEP), _SPACING_DEEP, _SPACING)
+        least, most = _TOO_NEAR, np.inf
         if self.rough.closed:
-            least, most = min(least, length[-1] / 16.0), min(most, length[-1] / 8.0)
+            least, most = min(least, length[-1] / 16.0), length[-1] / 8.0
         kept, ahead = [begin], self._direction(begin)
         for i in range(begin + 1, end):
             step = length[i] - length[kept[-1]]
             if step < least:
                 continue
             here = self._direction(i)
-            if here is not None and (step > most or ahead is None or float(here @ ahead) < _TURNED):
+            if here is not None and (step > min(most, spacing[i]) or ahead is None or float(here @ ahead) < _TURNED):
                 kept.append(i)
                 ahead = here
         return [*kept, end] if end > begin else kept
@@ -336,7 +341,7 @@ def _is_behind(point: Point, last: Point) -> bool:
     if length < 0.5 * _TOO_NEAR:
         return length < _SAME or ahead < 0.5 * length
     # On the same side of the branch, and further back on it.
-    return length < _SPACING and ahead < 0.0 and alike > _SHARP
+    return length < _SPACING_DEEP and ahead < 0.0 and alike > _SHARP
 
 
 def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:

@@ -388,7 +388,7 @@ def _finished(problem: Model, grown: _Grown, columns: NDArray[np.intp], spacing:
     shear, grip, shear_slope, grip_slope, work, gamma, k, net, inverse = _interpolated(
         _with_increments(np.stack(wanted)), big_l
     )
-    over = p - problem.surface_stress
+    over = np.maximum(p - problem.surface_stress, np.finfo(float).tiny)
     log_root_t = 0.5 * (np.log(p) + gamma - big_l)
     rate = slope * over * work * np.exp(log_root_t)  # of the flux by shear, in p
     glide = 0.5 * rate * over
