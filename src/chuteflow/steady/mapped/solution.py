@@ -56,6 +56,7 @@ from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.kinds import density_kind
 from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
 from chuteflow.theory import boundary
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
 
 #: Most coefficients that :func:`refine` takes, less one.
@@ -637,6 +638,7 @@ def _placed(
     chute: Chute, start: Flow | MappedSolution, degree: int, multiple: int | None
 ) -> tuple[MappedSystem, Array]:
     """The system of ``degree``, and ``start`` on it."""
+    require_richman(chute.base, "the mapped method is")
     if start.chute.surface != chute.surface:
         raise InputError(
             f"the flow to start from has the surface {start.chute.surface!r}: it must be that of the chute, "
