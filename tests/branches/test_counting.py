@@ -113,3 +113,15 @@ def test_flows_beside_a_fold_in_the_surface_temperature_that_the_search_saw_else
     found = flows(chute, T_surface=1.8593081146840105)
     assert [f.mass_holdup for f in found] == pytest.approx([2.946825, 2.953381], rel=1e-6)
     assert abs(found[0].mass_holdup / found[1].mass_holdup - 1.0) > 1e-3
+
+
+def test_flows_beside_a_fold_that_the_search_saw_three_percent_away_are_found():
+    chute = Chute(0.2357558866569397, 0.9260824535899073, 0.6492970045856133, 0.5715986039755248)
+    assert len(flows(chute, h=47.38846377607578)) == 5
+
+
+def test_flows_that_were_found_in_a_range_are_kept_when_it_is_widened():
+    chute = Chute(0.44793886974918284, 0.6856057331709164, 0.6319165062209413, 0.6507636112728579, surface="interface")
+    found = flows(chute, Q=6425.7998944922265)
+    assert found.searched.surface_temperature != (1e-3, 1e5)
+    assert sum(f.mass_holdup > 17.0 for f in found) == 2

@@ -41,7 +41,7 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 NEAR, _PER_SPACING = 0.005, 0.15
 #: So near where the rough quantity turns, since a fold is not known as well; it turns where it is nearest to the value
 #: within the second length along the branch, and further away by the third to both sides.
-_NEAR_TURN, _AROUND, _RISE = 0.03, 0.15, 0.01
+_NEAR_TURN, _AROUND, _RISE = 0.08, 0.15, 0.01
 #: A rough branch that is not longer, and as near to another, may be a piece of that one: where the residual is near to
 #: zero all along, its signs are not known well enough to join them.
 _SHORT, _BESIDE = 0.15, 0.15
@@ -322,12 +322,12 @@ def _turns_near(off: Array, arclength: Array) -> list[int]:
     """Rough flows at which a quantity comes nearest to its value without passing it, and turns."""
     away = np.abs(off)
     found = []
-    for i in np.flatnonzero(away < _NEAR_TURN).tolist():
+    for i in (np.flatnonzero(away[1:-1] < _NEAR_TURN) + 1).tolist():
         first = int(np.searchsorted(arclength, arclength[i] - _AROUND))
         last = int(np.searchsorted(arclength, arclength[i] + _AROUND, side="right"))
         before, after = away[first:i], away[i + 1 : last]
         least = min(before.min(initial=np.inf), after.min(initial=np.inf))
-        crossed = (off[first:last] >= 0.0).any() and (off[first:last] < 0.0).any()
+        crossed = (off[i - 1] >= 0.0) != (off[i] >= 0.0) or (off[i] >= 0.0) != (off[i + 1] >= 0.0)
         if not crossed and least >= away[i] and min(before.max(initial=0.0), after.max(initial=0.0)) > away[i] + _RISE:
             found.append(i)
     return found
