@@ -1,18 +1,19 @@
 # Everything is installed into .venv, at the versions of constraints.txt; Python 3.11 or later, pip and make
 # are enough. Stamp files remember what is done: after a change in src/ or pyproject.toml only the wheel is
-# built and installed anew, after a change in constraints.txt the packages follow.
+# built and installed again, after a change in constraints.txt the packages follow.
 
 .SHELLFLAGS := -ec
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 
 # The first interpreter that runs and is new enough. Another one: make PYTHON=/path/to/python3 ...
-PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
+PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
 WORKERS ?= 2
 
 VENV := .venv
-BIN := $(VENV)/bin
+# Where an environment has its programs; the variable is set on Windows alone.
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input
 INSTALL := $(PIP) install --quiet --progress-bar off
 

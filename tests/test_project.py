@@ -2,11 +2,13 @@
 
 import ast
 import importlib.metadata
+import inspect
 import re
 import shutil
 import subprocess
 import tomllib
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -246,6 +248,26 @@ def test_a_package_is_the_base_of_its_relative_imports():
     assert list(imported_from_package("chuteflow.steady", "from .solver import f", is_package=True)) == [
         (1, "chuteflow.steady.solver.f")
     ]
+
+
+#: What a drawing calls of the layers that compute: the order of the flows of a branch, and a smooth line through them.
+DRAWING = {"chuteflow.branches.lines.in_order", "chuteflow.branches.lines.runs", "chuteflow.branches.lines.smooth"}
+COMPUTING = LAYERS[LAYERS.index("trajectories") : LAYERS.index("io")]
+
+
+def functions_imported(module: str) -> set[str]:
+    """The functions of the layers that compute which a module imports."""
+    names = {name for _, name in imported_from_package(module, MODULES[module].read_text(encoding="utf-8"))}
+    found = {
+        (name, *name.rpartition(".")[::2]) for name in names if layer_of(name) in COMPUTING and name not in MODULES
+    }
+    return {name for name, home, part in found if inspect.isfunction(getattr(import_module(home), part))}
+
+
+def test_pictures_compute_nothing():
+    drawn = {module: functions_imported(module) - DRAWING for module in MODULES if layer_of(module) == "plotting"}
+    assert {module: found for module, found in drawn.items() if found} == {}
+    assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count"}
 
 
 def test_only_the_command_line_prints():

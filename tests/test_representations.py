@@ -1,5 +1,6 @@
 """What results show of themselves at a prompt and in a notebook: one line, one table."""
 
+from functools import cache
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,8 +15,16 @@ from chuteflow.stability.planes import FamilyMap, WaveMap
 
 CHUTE = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 NOWHERE = chuteflow.Chute(0.2, 0.8, 0.8, 0.85)
-FLOWS = chuteflow.flows(CHUTE, Q=3.0)
-CURVE = chuteflow.curve(CHUTE, points=200, surface_temperature=(0.01, 1000.0))
+
+
+@cache
+def paper_flows():
+    return chuteflow.flows(CHUTE, Q=3.0)
+
+
+@cache
+def paper_curve():
+    return chuteflow.curve(CHUTE, points=200, surface_temperature=(0.01, 1000.0))
 
 
 def public_results():
@@ -33,20 +42,20 @@ def public_results():
         tolerance=0.1,
         surface_temperature=(1.0, 10.0),
     )
-    stability = chuteflow.stability_of(FLOWS[2], kx=0.01, ky=0.0)
-    branch = CURVE.branches[0]
-    sample = Sample(0.0, FLOWS[2], stability)
+    stability = chuteflow.stability_of(paper_flows()[2], kx=0.01, ky=0.0)
+    branch = paper_curve().branches[0]
+    sample = Sample(0.0, paper_flows()[2], stability)
     marked = MarkedBranch(branch, (sample,) * 24, (Run("stable", branch.flows),), ())
     return [
         CHUTE,
-        FLOWS,
-        FLOWS[0],
-        FLOWS[0].sampled(),
-        FLOWS[0].energy_budget,
-        FLOWS[0].validity,
-        FLOWS.searched,
+        paper_flows(),
+        paper_flows()[0],
+        paper_flows()[0].sampled(),
+        paper_flows()[0].energy_budget,
+        paper_flows()[0].validity,
+        paper_flows().searched,
         chuteflow.flows(NOWHERE, Q=3.0),
-        CURVE,
+        paper_curve(),
         branch,
         branch.special[0],
         chuteflow.curve(NOWHERE),
@@ -62,9 +71,9 @@ def public_results():
         sample,
         marked,
         marked.runs[0],
-        MarkedCurve(CURVE, (marked,)),
+        MarkedCurve(paper_curve(), (marked,)),
         neutral,
-        WaveMap(FLOWS[0], axis, axis, growth, growth, growth > 0.0, growth > 1.0, 1e-6, (neutral,)),
+        WaveMap(paper_flows()[0], axis, axis, growth, growth, growth > 0.0, growth > 1.0, 1e-6, (neutral,)),
         FamilyMap(
             branch.flows, 0.0, axis, growth, growth, growth > 0.0, growth > 1.0, axis, (neutral,), (branch.flows,)
         ),
@@ -98,16 +107,18 @@ def test_tables_in_notebooks_are_well_formed_and_short(results):
 
 
 def test_lines_hold_the_numbers_that_place_a_flow():
-    assert repr(FLOWS[0]).startswith("<Flow: hot, dilute, deep; Q = 3, h = 8.8389, M = 0.43922, T_surface = 7.3386, ")
-    assert repr(FLOWS) == "<FlowSet: 3 flows; T_surface = 7.3386, 2.5405, 0.19681>"
-    assert repr(CURVE).startswith("<Curve: 1 family, 200 flows; Q from ")
+    assert repr(paper_flows()[0]).startswith(
+        "<Flow: hot, dilute, deep; Q = 3, h = 8.8389, M = 0.43922, T_surface = 7.3386, "
+    )
+    assert repr(paper_flows()) == "<FlowSet: 3 flows; T_surface = 7.3386, 2.5405, 0.19681>"
+    assert repr(paper_curve()).startswith("<Curve: 1 family, 200 flows; Q from ")
     assert repr(chuteflow.flows(NOWHERE, Q=3.0)).startswith("<FlowSet: 0 flows; ")
 
 
 def test_a_table_of_flows_has_their_numbers():
-    page = ElementTree.fromstring(f"<div>{FLOWS._repr_html_()}</div>")
+    page = ElementTree.fromstring(f"<div>{paper_flows()._repr_html_()}</div>")
     cells = [[cell.text for cell in row] for row in page.findall("./table/tbody/tr")]
-    assert [row[1] for row in cells] == [flow.name for flow in FLOWS]
+    assert [row[1] for row in cells] == [flow.name for flow in paper_flows()]
     assert [row[5] for row in cells] == ["7.3386", "2.5405", "0.19681"]
 
 

@@ -32,6 +32,7 @@ def test_the_command_line_has_the_same_bits_with_any_setting():
     assert run(arguments, 1) == run(arguments, 2)
 
 
+@pytest.mark.slow
 def test_the_package_has_the_same_bits_with_any_setting():
     code = (
         "import chuteflow\n"

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from importlib import import_module
 
 import click
 from docutils import nodes
@@ -25,7 +24,8 @@ class Commands(FromPackage):
         return [self._section(name, context) for name in program.list_commands(context)]
 
     def _section(self, name: str, parent: click.Context) -> nodes.section:
-        command = import_module(f"chuteflow.cli.commands.{name}").command
+        command = program.get_command(parent, name)
+        assert command is not None
         context = click.Context(command, info_name=name, parent=parent)
         title = f"chuteflow {name}"
         section = nodes.section(ids=[f"chuteflow-{name}"], names=[title])

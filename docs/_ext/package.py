@@ -1,4 +1,4 @@
-"""What the extensions share: pages that are made from the package are read anew when the package changes."""
+"""What the extensions share: pages that are made from the package are read again when the package changes."""
 
 import os
 from collections.abc import Callable, Iterable, Sequence

@@ -97,3 +97,31 @@ def test_two_flows_beside_a_fold_are_found_where_the_first_and_last_rough_flows_
     pair = [f for f in flows(chute, Q=5084.14610269072) if 0.01 < f.surface_temperature < 0.1]
     assert [f.mass_holdup for f in pair] == pytest.approx([22.63645003, 22.64098017], rel=1e-9)
     assert [f.surface_temperature for f in pair] == pytest.approx([0.0485653639, 0.0443641143], rel=1e-8)
+
+
+@pytest.mark.parametrize(("condition", "value"), [("Q", 7653.573889461369), ("M", 22.416297829409757)])
+def test_flows_where_the_residual_is_near_to_zero_all_along_are_found(condition, value):
+    """Beside the folds of two families the signs of the residual are not known well enough to join what was seen."""
+    chute = Chute(0.37141429564886336, 0.8023571956699849, 0.5399933535112227, 0.8100380660751175)
+    found = flows(chute, **{condition: value})
+    assert len(found) == 4
+    assert found.incomplete is None
+
+
+def test_flows_beside_a_fold_in_the_surface_temperature_that_the_search_saw_elsewhere_are_found():
+    chute = Chute(0.3935197336569905, 0.7707341874124249, 0.5386050915592441, 0.7664872639067919)
+    found = flows(chute, T_surface=1.8593081146840105)
+    assert [f.mass_holdup for f in found] == pytest.approx([2.946825, 2.953381], rel=1e-6)
+    assert abs(found[0].mass_holdup / found[1].mass_holdup - 1.0) > 1e-3
+
+
+def test_flows_beside_a_fold_that_the_search_saw_three_percent_away_are_found():
+    chute = Chute(0.2357558866569397, 0.9260824535899073, 0.6492970045856133, 0.5715986039755248)
+    assert len(flows(chute, h=47.38846377607578)) == 5
+
+
+def test_flows_that_were_found_in_a_range_are_kept_when_it_is_widened():
+    chute = Chute(0.44793886974918284, 0.6856057331709164, 0.6319165062209413, 0.6507636112728579, surface="interface")
+    found = flows(chute, Q=6425.7998944922265)
+    assert found.searched.surface_temperature != (1e-3, 1e5)
+    assert sum(f.mass_holdup > 17.0 for f in found) == 2

@@ -122,5 +122,6 @@ def test_near_folds_and_past_cusps_flows_are_those_of_a_dense_scan():
             if inside != expected:
                 different.append((chute, given, inside, expected))
                 print(different[-1], flush=True)
+    print(f"{CHUTES} chutes, {questions} questions, {len(different)} differ")
     assert not different
     assert questions >= CHUTES

@@ -9,9 +9,10 @@ import pytest
 from matplotlib.text import Annotation
 
 from chuteflow import Chute, boundary
+from chuteflow.bifurcations import diagram as diagrams
+from chuteflow.bifurcations.diagram import diagram
 from chuteflow.cli.program import main
 from chuteflow.io.boundary_records import boundaries_object, save
-from chuteflow.plotting import boundary_plot
 from chuteflow.plotting.boundary_plot import plot_boundaries
 
 CHUTE = Chute(0.3, 0.8, 0.8, 0.6)
@@ -42,7 +43,7 @@ def test_everything_at_once(capsys, folds, tmp_path):
     printed = json.loads(out)
     assert printed == boundaries_object(folds) == json.loads(file.read_text())
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert printed.keys() == {"chute", "of", "in", "range", "boundaries", "searched", "reason"}
+    assert printed.keys() == {"chute", "of", "in", "range", "boundaries", "searched", "reason", "incomplete"}
     assert printed["chute"] == {
         "slope": None, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun",
     }  # fmt: skip
@@ -84,7 +85,7 @@ def texts(figure):
 
 
 def test_a_picture_counts_the_flows_of_every_region(folds):
-    figure = plot_boundaries(folds)
+    figure = plot_boundaries(diagram(folds))
     assert sorted(texts(figure)) == ["1", "1", "3"]
     for text in figure.axes[0].texts:
         assert isinstance(text, Annotation)
@@ -95,12 +96,12 @@ def test_a_picture_counts_the_flows_of_every_region(folds):
 
 def test_a_region_whose_places_disagree_has_no_number(folds, monkeypatch):
     counts = iter(range(100))
-    monkeypatch.setattr(boundary_plot, "count", lambda found, value, quantity: next(counts))
-    assert texts(plot_boundaries(folds)) == []
+    monkeypatch.setattr(diagrams, "count", lambda found, value, quantity: next(counts))
+    assert texts(plot_boundaries(diagram(folds))) == []
 
 
 def test_a_picture_names_the_kinds_beside_an_onset(onset):
-    assert sorted(texts(plot_boundaries(onset, "surface_temperature"))) == ["inverted", "monotonic"]
+    assert sorted(texts(plot_boundaries(diagram(onset, "surface_temperature")))) == ["inverted", "monotonic"]
 
 
 def test_nothing_to_draw_is_drawn_with_its_reason(capsys, tmp_path):

@@ -1,6 +1,7 @@
 """``chuteflow growth`` and ``chuteflow neutral``: tables, JSON, files, pictures and bad input."""
 
 import json
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,7 +9,6 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute
-from chuteflow.cli.commands import growth
 from chuteflow.cli.program import main
 from chuteflow.plotting.growth_plot import plot_wave_map
 
@@ -36,7 +36,7 @@ def test_map_json_files_and_picture(capsys, tmp_path):
 
 
 def test_the_report_and_rows_of_csv(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(growth.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     away = SMALL.replace("0:0.02", "0.05:0.07").replace("0:0.03", "0.05:0.08")
     assert run(f"{away} --save {tmp_path / 'map.csv'}") == 0
     told = capsys.readouterr()

@@ -2,10 +2,11 @@
 
 import csv
 import json
+import sys
 
 import pytest
 
-from chuteflow.cli.commands import relax as command
+from chuteflow.cli import progress
 from chuteflow.cli.program import main
 
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
@@ -123,10 +124,10 @@ def test_what_cannot_be_followed_is_one_line(capsys):
 
 def test_a_slow_run_shows_how_far_it_is_on_a_terminal_alone(monkeypatch, capsys):
     clock = iter(range(100_000))
-    monkeypatch.setattr(command.time, "monotonic", lambda: 2.0 * next(clock))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: 2.0 * next(clock))
     assert run(f"{PAPER} --flux 3 --duration 1") == 0
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(command.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     assert run(f"{PAPER} --flux 3 --duration 1") == 0
     assert "of 1\r" in capsys.readouterr().err
 

@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,11 @@ from chuteflow import Chute, InputError, Scales, flows
 from chuteflow.cli.units import in_si, read_amount, read_si
 
 GRAINS = Scales(diameter=2e-3, density=2500.0)
-FLOW = flows(Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[0]
+
+
+@cache
+def flow():
+    return flows(Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[0]
 
 
 @pytest.mark.parametrize(
@@ -40,23 +46,23 @@ def test_an_amount_with_a_unit_is_made_dimensionless():
 
 
 def test_a_flow_in_si_units_by_hand():
-    numbers = in_si(FLOW, GRAINS).numbers
+    numbers = in_si(flow(), GRAINS).numbers
     g_cos = 9.81 * np.cos(np.arctan(0.3))
     assert numbers["mass_flux"].check("[mass]/[length]/[time]")
     assert numbers["mass_flux"].m_as("g/cm/s") == pytest.approx(3.0 * 2500 * 2e-3 * np.sqrt(g_cos * 2e-3) * 10)
-    assert numbers["centre_of_mass"].m_as("mm") == pytest.approx(2.0 * FLOW.centre_of_mass)
-    assert numbers["surface_temperature"].m_as("m^2/s^2") == pytest.approx(FLOW.surface_temperature * g_cos * 2e-3)
-    assert numbers["base_volume_fraction"].m_as("") == FLOW.base_volume_fraction
+    assert numbers["centre_of_mass"].m_as("mm") == pytest.approx(2.0 * flow().centre_of_mass)
+    assert numbers["surface_temperature"].m_as("m^2/s^2") == pytest.approx(flow().surface_temperature * g_cos * 2e-3)
+    assert numbers["base_volume_fraction"].m_as("") == flow().base_volume_fraction
 
 
 def test_profiles_in_si_units():
-    si = in_si(FLOW, GRAINS)
+    si = in_si(flow(), GRAINS)
     profile = si.profile(points=11)
-    wanted = FLOW.sampled(11)
-    assert profile["height"].m_as("mm")[-1] == pytest.approx(2.0 * FLOW.depth)
+    wanted = flow().sampled(11)
+    assert profile["height"].m_as("mm")[-1] == pytest.approx(2.0 * flow().depth)
     assert profile["production"].check("[mass]/[length]/[time]**3")
     np.testing.assert_allclose(
         profile["velocity"].m_as("m/s"), wanted.velocity * GRAINS.factor("velocity", 0.3), rtol=1e-12
     )
     at = si.profile([0.0, 4e-3])
-    np.testing.assert_allclose(at["volume_fraction"].m_as(""), FLOW.profile([0.0, 2.0]).volume_fraction, rtol=1e-12)
+    np.testing.assert_allclose(at["volume_fraction"].m_as(""), flow().profile([0.0, 2.0]).volume_fraction, rtol=1e-12)

@@ -386,6 +386,7 @@ def test_a_port_in_use_is_said():
         bound("no such host", None)
 
 
+@pytest.mark.slow
 def test_fifty_clients_and_random_requests_leave_the_server_up(served):
     with served() as page, ThreadPoolExecutor(50) as pool:
         rng = random.Random(5)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from functools import cache
 from typing import Any
 
 import h5netcdf
@@ -18,19 +19,20 @@ SUFFIXES = [".nc", ".csv", ".json"]
 GRAINS = Scales(diameter=1e-3, density=2500.0)
 
 
-def results():
-    return {
-        "flow": flows(PAPER, Q=3.0)[1],
-        "flows": flows(PAPER, Q=3.0),
-        "interface": flows(Chute(0.3, 0.8, 0.8, 0.6, surface="interface", closure="lun-fourier"), Q=3.0),
-        "none": flows(Chute(0.2, 0.8, 0.8, 0.85), Q=3.0),
-        "curve": curve(PAPER, points=20),
-        "families": curve(Chute(0.29, 0.9, 0.8, 0.7), points=12),
-        "no families": curve(Chute(0.2, 0.8, 0.8, 0.85)),
-    }
+RESULTS = {
+    "flow": lambda: flows(PAPER, Q=3.0)[1],
+    "flows": lambda: flows(PAPER, Q=3.0),
+    "interface": lambda: flows(Chute(0.3, 0.8, 0.8, 0.6, surface="interface", closure="lun-fourier"), Q=3.0),
+    "none": lambda: flows(Chute(0.2, 0.8, 0.8, 0.85), Q=3.0),
+    "curve": lambda: curve(PAPER, points=20),
+    "families": lambda: curve(Chute(0.29, 0.9, 0.8, 0.7), points=12),
+    "no families": lambda: curve(Chute(0.2, 0.8, 0.8, 0.85)),
+}
 
 
-RESULTS = results()
+@cache
+def result_of(name):
+    return RESULTS[name]()
 
 
 def assert_same_flow(a, b):
@@ -50,7 +52,7 @@ def assert_same_flow(a, b):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("scales", [None, GRAINS])
 def test_what_is_loaded_is_what_was_saved(name, suffix, scales, tmp_path):
-    result, path = RESULTS[name], tmp_path / f"result{suffix}"
+    result, path = result_of(name), tmp_path / f"result{suffix}"
     save(result, path, scales=scales)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     loaded: Any = load(path)
@@ -71,7 +73,7 @@ def test_what_is_loaded_is_what_was_saved(name, suffix, scales, tmp_path):
 
 def test_netcdf_says_what_it_holds(tmp_path):
     path = tmp_path / "flows.nc"
-    save(RESULTS["flows"], path, scales=GRAINS)
+    save(result_of("flows"), path, scales=GRAINS)
     with h5netcdf.File(path) as file:
         assert str(file.attrs["Conventions"]).startswith("CF-")
         for name in ("title", "source", "history", "references", "slope", "restitution", "tolerance"):
@@ -86,13 +88,13 @@ def test_netcdf_says_what_it_holds(tmp_path):
         velocity = file.variables["velocity"]
         assert velocity.dimensions == ("flow", "height_index")
         heights = file.variables["height"][...] / GRAINS.factor("height", 0.3)
-        flow = RESULTS["flows"][0]
+        flow = result_of("flows")[0]
         wanted = flow.profile(heights[0]).velocity * GRAINS.factor("velocity", 0.3)
         np.testing.assert_allclose(velocity[...][0], wanted, rtol=1e-10)
 
 
 def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
-    wanted = RESULTS["flows"]
+    wanted = result_of("flows")
     save(wanted, tmp_path / "flows.nc")
     with h5netcdf.File(tmp_path / "flows.nc") as file:
         for name in VALIDITY:
@@ -111,29 +113,29 @@ def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
 
 def test_csv_reads_as_a_table(tmp_path):
     path = tmp_path / "curve.csv"
-    save(RESULTS["curve"], path)
+    save(result_of("curve"), path)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
     rows = list(csv.DictReader(lines))
     plain = [float(row["mass_flux"]) for row in rows if not row["special"]]
-    np.testing.assert_array_equal(plain, RESULTS["curve"].branches[0].mass_flux)
+    np.testing.assert_array_equal(plain, result_of("curve").branches[0].mass_flux)
     assert [row["special"] for row in rows if row["special"]] == ["fold-Q", "density-inversion", "fold-Q"]
 
 
 def test_json_is_the_object_of_the_command_line(tmp_path):
     for name, shape in (("flows", flow_set_object), ("curve", curve_object)):
         path = tmp_path / f"{name}.json"
-        save(RESULTS[name], path)
+        save(result_of(name), path)
         text = path.read_text()
         assert "NaN" not in text
         assert "Infinity" not in text
-        assert shape(RESULTS[name]).items() <= json.loads(text).items()
+        assert shape(result_of(name)).items() <= json.loads(text).items()
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("damage", ["cut", "foreign", "empty", "later"])
 def test_a_damaged_file_is_refused_in_one_line(suffix, damage, tmp_path):
     path = tmp_path / f"result{suffix}"
-    save(RESULTS["flow"], path)
+    save(result_of("flow"), path)
     whole = path.read_bytes()
     if damage == "cut":
         path.write_bytes(whole[: len(whole) // 2])
@@ -164,13 +166,13 @@ def test_a_damaged_file_is_refused_in_one_line(suffix, damage, tmp_path):
 )
 def test_an_unwritable_target_is_named(name, message, tmp_path):
     with pytest.raises(InputError, match=message):
-        save(RESULTS["flow"], tmp_path / name)
+        save(result_of("flow"), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "result.json"
-    save(RESULTS["flow"], path)
+    save(result_of("flow"), path)
     before = path.read_bytes()
 
     def full(*_):
@@ -178,7 +180,7 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(InputError, match="No space left on device"):
-        save(RESULTS["flows"], path)
+        save(result_of("flows"), path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 

@@ -1,5 +1,6 @@
 """What is said of flows, chutes and curves, and how tables are set."""
 
+from functools import cache
 from itertools import pairwise
 
 import pytest
@@ -9,7 +10,11 @@ from chuteflow.io import tables, words
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 GRAINS = Scales(1e-3, 2500.0)
-CURVE = curve(PAPER, points=50)
+
+
+@cache
+def paper_curve():
+    return curve(PAPER, points=50)
 
 
 def test_three_flows_have_names_of_their_own():
@@ -55,7 +60,7 @@ def test_notes_explain_what_the_table_shows():
 
 
 def test_the_stretches_of_a_curve_have_their_validity():
-    said = list(words.validity(CURVE.branches[0].flows, PAPER, None))
+    said = list(words.validity(paper_curve().branches[0].flows, PAPER, None))
     assert said[0].startswith("from T_surface = 1e+05 to ")
     assert said[0].endswith(": large slip, rarefied")
     assert said[-1].endswith("to 0.001: packed: beyond the theory, large slip")
@@ -71,16 +76,16 @@ def test_kinds_are_said_in_words():
 
 
 def test_flows_that_share_a_flux_are_counted():
-    said = words.multiplicity(CURVE, None)
-    low, high = sorted(p.flow.mass_flux for p in CURVE.branches[0].special if p.kind == "fold-Q")
+    said = words.multiplicity(paper_curve(), None)
+    low, high = sorted(p.flow.mass_flux for p in paper_curve().branches[0].special if p.kind == "fold-Q")
     assert f"1 for Q from 0.23541 to {low:.5g}, 3 for Q from {low:.5g} to {high:.5g}, 1 for" in said
     for flux, count in ((0.9 * low, 1), (0.5 * (low + high), 3), (1.1 * high, 1)):
         assert len(flows(PAPER, Q=flux)) == count
 
 
 def test_ranges_carry_their_units():
-    assert words.searched(CURVE.searched, PAPER, None) == "searched: T_surface from 0.001 to 1e+05, M up to 30"
-    said = words.searched(CURVE.searched, PAPER, GRAINS)
+    assert words.searched(paper_curve().searched, PAPER, None) == "searched: T_surface from 0.001 to 1e+05, M up to 30"
+    said = words.searched(paper_curve().searched, PAPER, GRAINS)
     assert said.endswith("m^2/s^2, M up to 75 kg/m^2")
 
 

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, curve, domain, flows, hot
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.counting import most_at_once
 from chuteflow.maps import CODES, exists_at
 from chuteflow.maps.columns import Part, alike
-from chuteflow.maps.fan import Base, fan
-from chuteflow.maps.kinds import _monotonic_pieces, _most
-from chuteflow.maps.plane import code
+from chuteflow.maps.kinds import _monotonic_pieces, kinds
+from chuteflow.maps.plane import Axis, Plane, code
+from chuteflow.maps.zeros import extremes_on, zeros_on
+from chuteflow.steady.model import model
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
+from chuteflow.trajectories.refining import carry_down
 
 from .domain_points import compare, enumerated, random_planes
 
@@ -71,7 +73,7 @@ def test_a_temperature_that_cannot_be_is_refused(temperature):
 
 @pytest.fixture(scope="module")
 def base_map():
-    """Over both parameters of the base, which share one fan of trajectories."""
+    """Over both parameters of the base, which share one grid of trajectories."""
     return domain(
         Chute(0.3, 0.8, 0.8, 0.6),
         ("wall_restitution", 0.6, 0.9),
@@ -258,11 +260,38 @@ def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
     assert (np.diff(log_q) > 0.0).all()
     assert (rise > 0.0).all()
     pieces = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
-    assert _most(pieces) == 3
-    assert _most(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
+    assert most_at_once(pieces) == 3
+    assert most_at_once(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
 
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():
     chute = Chute(0.38750000000000007, 0.7901041666666666, 0.8, 0.6)
-    found = fan(chute, [Base.of(chute)], Range.checked((1e-3, 1e5), 30.0), np.array([]), 12)
-    assert np.isfinite(found.log_mass).all()
+    grid = carry_down(model(chute), 1e-3, 1e5, 30.0)
+    zeros = zeros_on(grid, extremes_on(grid))
+    assert np.isfinite([zeros.log_q, zeros.log_m, zeros.log_t, zeros.rise]).all()
+
+
+@pytest.mark.parametrize("surface", ["free", "interface"])
+def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface):
+    """On a slope where saddle and centre coexist, so that trajectories wind."""
+    plane = Plane(
+        Axis("roughness", 0.5, 0.866), Axis("wall_restitution", 0.4, 0.95), Chute(0.4, 0.8, 0.8, 0.7, surface), ()
+    )
+    for u, v in np.random.default_rng(3).uniform(size=(6, 2)):
+        grid = carry_down(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
+        alone = kinds(grid, extremes_on(grid), ())
+        assert code(plane, u, v)[:2] == (alone.most, alone.families)
+
+
+@pytest.mark.parametrize(
+    ("chute", "expected"),
+    [
+        (Chute(0.47470002445560056, 0.6572855104534975, 0.9508171882287197, 0.5855234301669094, "interface"), (0, 0)),
+        (Chute(0.47503803782221854, 0.6586131909135841, 0.6871708648089082, 0.5711874528328157, "interface"), (0, 0)),
+        (Chute(0.46259287459556375, 0.6596572551540848, 0.6437188262973245, 0.8158457924446051, "interface"), (3, 2)),
+    ],
+)
+def test_deep_families_of_steep_chutes_are_those_that_are_solved(chute, expected):
+    plane = Plane(Axis("slope", 0.1, 0.6), Axis("roughness", 0.5, 0.866), chute, ())
+    found = code(plane, (chute.slope - 0.1) / 0.5, (chute.roughness - 0.5) / 0.366)
+    assert found[:2] == expected

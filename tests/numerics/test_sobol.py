@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.sobol import MOST_DIMENSIONS, Sobol
 
 
 def test_unscrambled_points_are_those_of_scipy():
+    from scipy.stats import qmc  # whose import takes a third of a second
+
     theirs = qmc.Sobol(MOST_DIMENSIONS, scramble=False).random(4096)
     assert np.array_equal(Sobol(MOST_DIMENSIONS).points(0, 4096), theirs)
 

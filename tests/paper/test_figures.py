@@ -3,6 +3,7 @@
 import csv
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 
 import numpy as np
@@ -19,8 +20,15 @@ from chuteflow.plotting import style
 PRINTED = {"A": (7.34, 8.84, 0.44), "B": (2.54, 3.98, 0.59), "C": (0.197, 1.77, 1.26)}
 DIGITS = {"A": (2, 2, 2), "B": (2, 2, 2), "C": (3, 2, 2)}
 
-PROFILES = figure_02.compute()
-CURVES = figure_03.compute()
+
+@cache
+def profiles():
+    return figure_02.compute()
+
+
+@cache
+def curves():
+    return figure_03.compute()
 
 
 def drawn(axes):
@@ -58,9 +66,9 @@ def test_a_figure_that_is_not_there_is_refused():
 
 
 @pytest.mark.parametrize("name", PRINTED)
-@pytest.mark.parametrize("found", [PROFILES.flows, CURVES.flows], ids=["figure 2", "figure 3"])
-def test_the_flows_are_those_of_the_caption(found, name):
-    flow = found[name]
+@pytest.mark.parametrize("computed", [profiles, curves], ids=["figure 2", "figure 3"])
+def test_the_flows_are_those_of_the_caption(computed, name):
+    flow = computed().flows[name]
     numbers = (flow.surface_temperature, flow.centre_of_mass, flow.mass_holdup)
     assert tuple(map(round, numbers, DIGITS[name])) == PRINTED[name]
     assert flow.mass_flux == pytest.approx(3.0, rel=1e-10)
@@ -68,23 +76,23 @@ def test_the_flows_are_those_of_the_caption(found, name):
 
 
 def test_the_profiles_are_those_of_the_text():
-    density = {name: profile.volume_fraction for name, profile in PROFILES.profiles.items()}
+    density = {name: profile.volume_fraction for name, profile in profiles().profiles.items()}
     assert np.argmax(density["C"]) > 0, "C shows a density inversion"
     for name in "AB":
         assert np.all(np.diff(density[name]) < 0.0), "A and B decay monotonically"
-    slip = [PROFILES.profiles[name].velocity[0] for name in "ABC"]
+    slip = [profiles().profiles[name].velocity[0] for name in "ABC"]
     assert slip == sorted(slip, reverse=True), "slip falls with increasing density"
-    for profile in PROFILES.profiles.values():
+    for profile in profiles().profiles.values():
         assert np.argmax(profile.granular_temperature) == 0, "the temperature is largest at the base"
 
 
 @pytest.mark.parametrize(("panel", "field"), [*enumerate(figure_02.FIELDS)])
 def test_figure_2_draws_the_profiles_in_the_strokes_of_the_caption(panel, field):
-    axes = figure_02.draw(PROFILES).axes[panel]
+    axes = figure_02.draw(profiles()).axes[panel]
     lines = drawn(axes)
     dashes = [style.SOLID, style.DOTTED, style.DASHED]
     wanted = axes.plot([], [], linestyle=dashes[0])[0], *(axes.plot([], [], linestyle=d)[0] for d in dashes[1:])
-    for line, like, (name, profile) in zip(lines, wanted, PROFILES.profiles.items(), strict=True):
+    for line, like, (name, profile) in zip(lines, wanted, profiles().profiles.items(), strict=True):
         assert str(line.get_label()).startswith(f"{name}: ")
         assert line.get_linestyle() == like.get_linestyle()
         np.testing.assert_array_equal(line.get_xdata(), getattr(profile, field))
@@ -99,7 +107,7 @@ def test_figure_2_draws_the_profiles_in_the_strokes_of_the_caption(panel, field)
 
 
 def test_the_curve_has_three_flows_between_its_folds():
-    (branch,) = CURVES.curve.branches
+    (branch,) = curves().curve.branches
     folds = sorted(point.flow.mass_flux for point in branch.special if point.kind == "fold-Q")
     assert len(folds) == 2
     assert folds[0] < 3.0 < folds[1]
@@ -107,7 +115,7 @@ def test_the_curve_has_three_flows_between_its_folds():
 
 
 def test_hold_up_and_centre_of_mass_are_one_to_one():
-    (branch,) = CURVES.curve.branches
+    (branch,) = curves().curve.branches
     order = np.argsort(branch.mass_holdup)
     assert np.all(np.diff(branch.centre_of_mass[order]) < 0.0)
 
@@ -115,8 +123,8 @@ def test_hold_up_and_centre_of_mass_are_one_to_one():
 @pytest.mark.parametrize(("panel", "axes_of"), [*enumerate(figure_03.PANELS)])
 def test_the_named_flows_lie_on_the_curves(panel, axes_of):
     x, y, right, top, _ = axes_of
-    axes = figure_03.draw(CURVES).axes[panel]
-    assert points(axes) == [(getattr(f, x), getattr(f, y)) for f in CURVES.flows.values()]
+    axes = figure_03.draw(curves()).axes[panel]
+    assert points(axes) == [(getattr(f, x), getattr(f, y)) for f in curves().flows.values()]
     assert sorted(text.get_text() for text in axes.texts) == ["A", "B", "C"]
     (line,) = drawn(axes)
     u, v = np.asarray(line.get_xdata()) / right, np.asarray(line.get_ydata()) / top
@@ -131,7 +139,7 @@ def test_the_named_flows_lie_on_the_curves(panel, axes_of):
 
 
 def test_the_curves_leave_the_panels_smoothly():
-    for axes in figure_03.draw(CURVES).axes:
+    for axes in figure_03.draw(curves()).axes:
         (line,) = drawn(axes)
         size = np.array([axes.get_xlim()[1], axes.get_ylim()[1]])
         path = np.array([line.get_xdata(), line.get_ydata()]).T / size
@@ -143,19 +151,19 @@ def test_the_curves_leave_the_panels_smoothly():
 
 
 def test_the_data_of_figure_2_hold_what_is_drawn():
-    notes, rows = read(csv_text(PROFILES))
+    notes, rows = read(csv_text(profiles()))
     assert any("slope = 0.3" in note for note in notes)
     assert any(note.startswith("# C: T_surface = 0.19680") for note in notes)
-    for name, profile in PROFILES.profiles.items():
+    for name, profile in profiles().profiles.items():
         for field in ("height", *figure_02.FIELDS):
             values = [float(row[field]) for row in rows if row["flow"] == name]
             np.testing.assert_array_equal(values, getattr(profile, field))
 
 
 def test_the_data_of_figure_3_hold_what_is_drawn():
-    notes, rows = read(csv_text(CURVES))
+    notes, rows = read(csv_text(curves()))
     assert sum("fold-Q" in note for note in notes) == 2
-    (line,) = drawn(figure_03.draw(CURVES).axes[0])
+    (line,) = drawn(figure_03.draw(curves()).axes[0])
     along = [row for row in rows if row["flows"] == "family 1"]
     np.testing.assert_array_equal([float(row["mass_flux"]) for row in along], line.get_xdata())
     np.testing.assert_array_equal([float(row["centre_of_mass"]) for row in along], line.get_ydata())
@@ -174,7 +182,7 @@ def test_the_command_writes_pictures_and_data(kind, tmp_path, capsys):
     begins = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[kind]
     assert (out / f"figure_02.{kind}").read_bytes().startswith(begins)
     assert len(capsys.readouterr().out.splitlines()) == 2
-    written = csv_text(PROFILES, method_note(2, OVERBURDEN))
+    written = csv_text(profiles(), method_note(2, OVERBURDEN))
     assert (out / "figure_02.csv").read_text(encoding="utf-8") == written
 
 

@@ -34,7 +34,7 @@ def kinds(found, field="density"):
 # All of them
 
 
-@pytest.mark.parametrize("number", NEW)
+@pytest.mark.parametrize("number", [pytest.param(n, marks=pytest.mark.slow) if n in (4, 9) else n for n in NEW])
 def test_data_are_a_table_of_numbers(number):
     text = csv_text(data(number))
     assert f"Figure {number}: " in text.splitlines()[0]

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import matplotlib
@@ -20,8 +21,12 @@ from chuteflow.plotting.plots import plot_curve, plot_flows, write_figure
 from chuteflow.stability.planes import FamilyMap
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
+
+
 #: The curve of the paper's chute with the usual number of flows.
-CURVE = curve(PAPER)
+@cache
+def paper_curve():
+    return curve(PAPER)
 
 
 def lines_of(axes):
@@ -143,7 +148,7 @@ def test_lines_pass_through_all_flows_and_stay_on_the_curve():
 
 
 def test_folds_are_round_at_the_usual_number_of_flows():
-    figure = plot_curve(CURVE)
+    figure = plot_curve(paper_curve())
     figure.draw_without_rendering()
     for axes in figure.axes:
         for line in lines_of(axes):
@@ -223,10 +228,10 @@ def test_the_surface_temperature_has_one_symbol(surface):
 
 
 def test_what_is_beyond_the_theory_is_marked():
-    figure = plot_curve(CURVE)
+    figure = plot_curve(paper_curve())
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[-2:] == ["packed: beyond the theory", "dense: beyond the theory"]
-    (branch,) = CURVE.branches
+    (branch,) = paper_curve().branches
     dense = [flow.mass_flux for flow in branch.flows if flow.largest_volume_fraction > 0.49]
     wide = [line for line in lines_of(figure.axes[0]) if line.get_linewidth() > 4.0]
     flux = np.concatenate([values(line.get_xdata()) for line in wide])

@@ -1,7 +1,7 @@
 """The paper's method against the overburden one, and against itself: order, counts, limits, continuation."""
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 from itertools import pairwise
 
@@ -336,3 +336,9 @@ def test_the_curve_adapts_degree_and_multiple_and_passes_the_known_flows():
     )
     third = refine(PAPER, near, AT_FLUX)
     np.testing.assert_allclose(third.macroscopic, references("paper")[2].solution.macroscopic, atol=1e-8)
+
+
+def test_another_base_is_refused():
+    other = replace(PAPER, base="johnson-jackson:specularity=0.5")
+    with pytest.raises(InputError, match="the mapped method is known for the base richman alone"):
+        solve_mapped(other, flows(PAPER, Q=3.0)[0], AT_FLUX, 16)

@@ -106,3 +106,12 @@ def test_a_deep_flow_has_a_grid_in_pieces_that_files_keep(tmp_path):
 def test_a_tolerance_out_of_range_is_refused(tolerance):
     with pytest.raises(InputError, match="must be from 1e-11 to 1e-3"):
         checked_tolerance(tolerance)
+
+
+def test_profiles_of_a_flow_that_was_asked_for_roughly_have_digits():
+    chute = Chute(
+        0.5481870417661991, 0.6017108160903987, 0.45537545654084555, 0.7947240587065366, "interface", "lun-fourier"
+    )
+    sharp, *rough = (flows(chute, h=759.6467995469225, tolerance=t)[1] for t in (1e-10, 1e-8, 1e-6))
+    for flow in rough:
+        assert flow.largest_volume_fraction == pytest.approx(sharp.largest_volume_fraction, rel=1e-6)

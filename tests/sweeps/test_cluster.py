@@ -76,6 +76,7 @@ def test_a_cluster_computes_the_same_and_survives_the_loss_of_a_worker(tmp_path,
         assert 0 < len(other.done()) < other.study.chunks
 
 
+@pytest.mark.slow
 def test_an_address_where_nothing_answers_is_told():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -11,22 +11,23 @@ from chuteflow import Chute, flows
 from chuteflow.errors import InputError, SolveError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES
+from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps import engine
 from chuteflow.sweeps.batch import Batch
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.marching import start
-from chuteflow.sweeps.numbers import DENSITIES, INTERIORS
 from chuteflow.sweeps.outcome import Reason, Status
 from chuteflow.sweeps.study import from_dict
 from chuteflow.theory.boundary import surface_stress
-from chuteflow.theory.laws import LAWS
 
 VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0.3, 1e3)}
 #: Kinds that are found without solving each flow.
 KINDS = {"interior": INTERIORS, "density": DENSITIES}
 MACROSCOPIC = ("mass_flux", "centre_of_mass", "mass_holdup")
 PAPER = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
+#: Laws that are marched side by side, in the order of their numbers.
+CLOSURES = ("lun", "lun-fourier")
 
 
 def random_study(condition, points, seed):
@@ -41,7 +42,7 @@ def random_study(condition, points, seed):
                 "roughness": {"from": 0.5, "to": 0.866},
                 condition: {"from": low, "to": high, "scale": "log"},
                 "surface": list(SURFACES),
-                "closure": list(LAWS),
+                "closure": list(CLOSURES),
             },
             "results": {"quantities": [*NUMBERS, *KINDS], "chunk": points, "flows": 16},
         },
@@ -52,7 +53,7 @@ def random_study(condition, points, seed):
 def chute_of(chunk, i):
     p = chunk.parameters
     slope, e, ew, roughness = (float(p[name][i]) for name in BY_KEY)
-    surface, closure = SURFACES[int(p["surface"][i])], tuple(LAWS)[int(p["closure"][i])]
+    surface, closure = SURFACES[int(p["surface"][i])], CLOSURES[int(p["closure"][i])]
     return Chute(slope, e, ew, roughness, surface, closure)
 
 

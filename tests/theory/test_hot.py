@@ -45,6 +45,8 @@ SMOOTHNESS = st.floats(0.0, 1.0)
 ROUGHNESS = st.floats(0.5, math.sqrt(3.0) / 2.0)
 
 #: e = e_w = 0.8, r = 0.6: the material and base of most of the paper's figures.
+#: Laws with a temperature far above: that of Garzo & Dufty in full has none.
+WITH_LIMIT = [name for name in LAWS if name != "garzo-dufty"]
 MATERIAL = dilute(LAWS["lun"], 0.8, 0.3)
 PRODUCTIVE = dilute(LAWS["lun"], 0.9, 0.4)
 
@@ -68,12 +70,12 @@ def test_dilute_limits_are_those_of_table_2(e):
     assert pytest.approx(5.0 * math.pi / (96.0 * math.sqrt(2.0)), rel=1e-14) == limit.A0  # (4.4)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [name for name in WITH_LIMIT if not LAWS[name].knows_slope])
 def test_dilute_limits_do_not_know_the_slope(name):
     assert dilute(LAWS[name], 0.85, 0.1) == dilute(LAWS[name], 0.85, 0.7)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", WITH_LIMIT)
 def test_boundary_functions_are_the_limits_of_3_16_and_3_18(name):
     """F1 -> F10 (4.2), F2/nu -> F21 (4.3), with an error of the order of nu."""
     e, e_w, r, slope = 0.8, 0.7, 0.65, 0.33

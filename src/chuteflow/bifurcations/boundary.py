@@ -25,8 +25,10 @@ from chuteflow.numerics.continuation import Control
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.kinks import crossings
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
+from chuteflow.theory.constitutive import require_limit
 from chuteflow.threads import on_one_thread
 
 #: What can be followed.
@@ -143,6 +145,17 @@ class BoundarySet(Sequence[Boundary]):
     searched: Searched
     tolerance: float
     reason: str | None
+
+    @cached_property
+    def incomplete(self) -> str | None:
+        """Which flows boundaries were not followed among, in words; None where there are none."""
+        solutions = (solution for families in self.families for family in families for solution in family.solutions)
+        if not any(crossings(solution.elements).size for solution in solutions):
+            return None
+        return (
+            f"the density of some flows passes a break of the closure {self.chute.closure}: boundaries among these "
+            "are not followed, and may be missing"
+        )
 
     def __repr__(self) -> str:
         count = display.counted(len(self), "boundary", "boundaries")
@@ -269,7 +282,9 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
     low, high = pair("bounds", bounds)
     sweep = Sweep(chute, second, low, high)
     for value in (low, high):
-        sweep.chute_at(value)  # which says what is allowed
+        end = sweep.chute_at(value)  # which says what is allowed
+        if end.surface == "free":
+            require_limit(end.law, end.restitution, end.slope, "boundaries need")
     if not low < high:
         raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")
     return sweep

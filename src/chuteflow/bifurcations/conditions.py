@@ -25,9 +25,10 @@ from typing import Protocol, Self, cast
 import numpy as np
 
 from chuteflow.numerics.chebyshev import AnyGrid, Array, grid, interpolation_matrix, refinement
+from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
-from chuteflow.steady.model import IMAGINARY_STEP, LOSS, WORK
+from chuteflow.steady.model import LOSS, WORK
 
 #: Degree of the grid on which the largest of a field is looked for, if it is finer than the solution's.
 _SAMPLES = 96
@@ -53,7 +54,7 @@ class Local:
     def at(cls, problem: Collocation, stepped: Collocation, z: Array) -> Local:
         """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further."""
         state, beyond = problem.state(z), stepped.state(z)
-        return cls(z, state, beyond, state.residual(), state.jacobian(), beyond.residual().imag / IMAGINARY_STEP)
+        return cls(z, state, beyond, state.residual(), state.jacobian(), derivative(beyond.residual()))
 
 
 class Condition(Protocol):
@@ -104,7 +105,7 @@ class Fold:
         aside = along(at, v)
         by_z = w @ _bordered(aside.jacobian(), aside.macroscopic_gradient()[which])
         by_parameter = w @ _bordered(at.stepped.jacobian(), at.stepped.macroscopic_gradient()[which]) @ v
-        return g, -by_z.imag / IMAGINARY_STEP, -float(by_parameter.imag) / IMAGINARY_STEP
+        return g, -derivative(by_z), -float(derivative(by_parameter))
 
     def suits(self, at: Local) -> bool:
         """See :class:`Condition`."""
@@ -197,7 +198,7 @@ class InteriorChange(_OfFields):
         row = _largest(state.problem.grid, state.net_loss if self.largest else -state.net_loss)
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
         by_z = np.concatenate([-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.laden]])
-        return float(row @ state.net_loss), by_z, float(row @ at.stepped.net_loss.imag) / IMAGINARY_STEP
+        return float(row @ state.net_loss), by_z, float(row @ derivative(at.stepped.net_loss))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,15 +211,15 @@ class Held(_OfFields):
     def __call__(self, at: Local) -> tuple[float, Array, float]:
         """See :class:`Condition`."""
         which = self.which
-        by_parameter = float(at.stepped.macroscopic()[which].imag) / IMAGINARY_STEP
+        by_parameter = float(derivative(at.stepped.macroscopic()[which]))
         off = float(at.state.macroscopic()[which]) - self.value
         return off, at.state.macroscopic_gradient()[which], by_parameter
 
 
 def along(at: Local, direction: Array) -> State:
-    """The state an imaginary step along a direction (n+3,) of the unknowns: its imaginary parts, over
-    IMAGINARY_STEP, are derivatives along it."""
-    return at.state.problem.state(cast("Array", at.z + 1j * IMAGINARY_STEP * direction))
+    """The state an imaginary step along a direction (n+3,) of the unknowns: see
+    :mod:`chuteflow.numerics.complex_step`."""
+    return at.state.problem.state(cast("Array", stepped(at.z, direction)))
 
 
 def _bordered(jacobian: Array, gradient: Array) -> Array:

@@ -12,11 +12,11 @@ import numpy as np
 from chuteflow.bifurcations.system import BoundarySystem
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.model import IMAGINARY_STEP
 from chuteflow.steady.solver import Solution, Status, prolong
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
@@ -117,7 +117,7 @@ def _noise(system: BoundarySystem, w: Array, jacobian: Array) -> float:
     """What rounding of the equations can do to the quantities."""
     gradient = np.zeros((len(w), 4))
     gradient[:-1, :3] = system.problem(float(w[-1])).state(w[:-1]).macroscopic_gradient()[:LOG_T].T
-    by_parameter = system.local(w).stepped.macroscopic()[:LOG_T].imag / IMAGINARY_STEP
+    by_parameter = derivative(system.local(w).stepped.macroscopic()[:LOG_T])
     gradient[-1] = np.append(by_parameter, 1.0 / _size(system, w))
     sensitivity = np.abs(solve_each(jacobian.T, gradient)).sum(axis=0).max()
     return max(_FLOOR, _NOISE * float(sensitivity))

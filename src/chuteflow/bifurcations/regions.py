@@ -18,9 +18,10 @@ from chuteflow.branches.enumeration import flows
 from chuteflow.branches.families import TracedFamily
 from chuteflow.branches.ranges import Range
 from chuteflow.errors import InputError
+from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import LOG_M, LOG_T
-from chuteflow.steady.model import IMAGINARY_STEP
+from chuteflow.steady.kinds import DENSITIES, DISSIPATIVE, MIXED, PRODUCTIVE
 from chuteflow.steady.solver import Solution
 
 #: The argument of :func:`chuteflow.flows` that holds the quantity which folds.
@@ -92,14 +93,14 @@ def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     point: BoundaryPoint = boundary.traced.points[index]
     condition = point.system.condition
     if isinstance(condition, Inversion):
-        kinds = ("monotonic", "inverted")
+        kinds = DENSITIES
     elif isinstance(condition, InteriorChange):
-        kinds = ("productive", "mixed") if condition.largest else ("mixed", "dissipative")
+        kinds = (PRODUCTIVE, MIXED) if condition.largest else (MIXED, DISSIPATIVE)
     else:
         return None
     at = point.system.local(point.w)
     matrix = np.concatenate([at.by_z, at.state.macroscopic_gradient()[which][None]])
-    moved = np.append(at.by_parameter, at.stepped.macroscopic()[which].imag / IMAGINARY_STEP)
+    moved = np.append(at.by_parameter, derivative(at.stepped.macroscopic()[which]))
     _, by_z, by_parameter = condition(at)
     rate = by_parameter - float(by_z @ solve_each(matrix, moved))
     if not np.isfinite(rate):

@@ -10,9 +10,8 @@ from the ends of families, the parameter is moved until the condition holds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +25,7 @@ from chuteflow.branches.ranges import Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
+from chuteflow.numerics.roots import bisected
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition as SolverCondition
@@ -269,7 +269,8 @@ def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: floa
     for balance in (_at_surface, _least):
         ends = balance(sweep, low), balance(sweep, high)
         if (ends[0] > 0.0) != (ends[1] > 0.0):
-            out.append(_root(partial(balance, sweep), low, high, ends[0] > 0.0))
+            sign = 1.0 if ends[1] > 0.0 else -1.0
+            out.append(bisected(lambda value, sign=sign, of=balance: sign * of(sweep, value), low, high, _CLOSE))
     return out
 
 
@@ -307,13 +308,3 @@ def _least(sweep: Sweep, value: float) -> float:
         least = float(net[k])
         low, high = log_x[max(k - 1, 0)], log_x[min(k + 1, _SAMPLES - 1)]
     return least
-
-
-def _root(function: Callable[[float], float], low: float, high: float, falling: bool) -> float:
-    """Where a function changes sign once, by bisection to rounding."""
-    while high - low > _CLOSE * high:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        low, high = (middle, high) if (function(middle) > 0.0) == falling else (low, middle)
-    return 0.5 * (low + high)

@@ -21,7 +21,6 @@ from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.model import Model, model_along
 from chuteflow.steady.solver import default_stretch
 from chuteflow.theory.constitutive import Law
-from chuteflow.theory.laws import law
 
 #: Length, in the plane of ln T_surface and ln M, that counts as much as the whole range of the parameter.
 _SPAN = 6.0
@@ -49,7 +48,7 @@ class Sweep:
 
     def models(self, value: float) -> tuple[Model, Model]:
         """The problem at a value of the parameter, and an imaginary step further."""
-        return _models(self, law(self.chute.closure), value)
+        return _models(self, self.chute.law, value)
 
     def chute_at(self, value: float) -> Chute:
         """The chute at a value of the parameter, which may be beyond the range by rounding."""

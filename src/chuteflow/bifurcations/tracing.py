@@ -15,10 +15,10 @@ from chuteflow.bifurcations.system import BoundarySystem, Sweep
 from chuteflow.branches.ranges import Range
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.elements import DEGREES
-from chuteflow.steady.model import IMAGINARY_STEP
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
 CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
@@ -283,7 +283,7 @@ def _definite(at: Local) -> bool:
     """
     u, _, v = np.linalg.svd(at.by_z)
     plane, psi = v[-2:], u[:, -1]
-    bends = [along(at, n).jacobian().imag / IMAGINARY_STEP for n in plane]
+    bends = [derivative(along(at, n).jacobian()) for n in plane]
     hessian = np.array([[psi @ bend @ n for n in plane] for bend in bends])
     return bool(np.linalg.det(hessian) > 0.0)
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from chuteflow.branches.lines import SteadyBranch
 from chuteflow.branches.ranges import goes_on
 from chuteflow.branches.results import Branch, Curve
+from chuteflow.numerics.chebyshev import Array
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,21 @@ def flux_counts(curve: Curve) -> list[Count]:
     return counts
 
 
-def _monotonic(branch: Branch) -> list[tuple[float, float]]:
+def flows_at_flux(branches: Iterable[SteadyBranch], mass_flux: float) -> int:
+    """How many flows of ``branches`` have this mass flux, by the stretches between folds: there is one on each."""
+    return sum(low <= mass_flux < high for branch in branches for low, high in _monotonic(branch))
+
+
+def most_at_once(stretches: Array, apart: float = 0.0) -> int:
+    """The largest number of ``stretches`` (k, 2), each from a lower to a higher value, that share a value, where those
+    that overlap by no more than ``apart`` do not count as sharing one."""
+    low, high = stretches.T
+    edges = np.concatenate([low + apart, high])
+    order = np.lexsort((np.repeat([1, 0], len(low)), edges))
+    return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
+
+
+def _monotonic(branch: SteadyBranch) -> list[tuple[float, float]]:
     """Lowest and highest mass flux of the stretches of a branch between its folds."""
     stops = _stops(branch)
     return [(min(pair), max(pair)) for pair in pairwise(stops)]
@@ -53,6 +70,6 @@ def _beyond(branch: Branch) -> list[tuple[float, float]]:
     return [(end, np.inf) if end > before else (0.0, end) for before, end, words in ends if goes_on(words)]
 
 
-def _stops(branch: Branch) -> list[float]:
+def _stops(branch: SteadyBranch) -> list[float]:
     turns = [point.flow.mass_flux for point in branch.special if point.kind == "fold-Q"]
     return [branch.flows[0].mass_flux, *turns, branch.flows[-1].mass_flux]

@@ -18,6 +18,7 @@ from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.branches.rough_turns import dips
 from chuteflow.checks import whole
+from chuteflow.errors import SolveError
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
@@ -69,8 +70,9 @@ def curve(
     found, lost = trace_all(problem, within, tolerance)
     grid = search(problem, within)
     longest = max((float(family.arclength[-1]) for family in found), default=1.0)
+    doubts: list[str] = []
     branches = [
-        _branch(chute, family, _samples(family, points, float(family.arclength[-1]) / longest), tolerance)
+        _branch(chute, family, _samples(family, points, float(family.arclength[-1]) / longest), tolerance, doubts)
         for family in found
     ]
     branches.sort(key=lambda branch: -float(branch.surface_temperature.max()))
@@ -80,7 +82,7 @@ def curve(
         searched=searched(within, grid),
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
-        incomplete=doubt(grid, within, lost, "a family"),
+        incomplete=next(iter(doubts), None) or doubt(grid, within, lost, "a family"),
     )
 
 
@@ -90,10 +92,17 @@ def _samples(family: TracedFamily, points: int, fraction: float) -> int:
     return max(8, round(points * fraction), min(points, len(family.points)))
 
 
-def _branch(chute: Chute, family: TracedFamily, count: int, tolerance: float) -> Branch:
+def _branch(chute: Chute, family: TracedFamily, count: int, tolerance: float, doubts: list[str]) -> Branch:
     places = np.linspace(0.0, family.arclength[-1], count)
     solutions = [point.solution for point in family.at(places, tolerance)]
-    located = [*_folds(chute, family, tolerance), *_changes(chute, family, tolerance)]
+    located: list[tuple[str, Flow, float]] = []
+    for locate in (_folds, _changes):
+        try:
+            located += locate(chute, family, tolerance)
+        except SolveError:
+            # One point that is not found must not cost the curve.
+            low, high = np.exp(np.sort(family.macroscopic[[0, -1], LOG_M]))
+            doubts.append(f"not all special points of the family from M = {low:.4g} to {high:.4g} could be located")
     ends, heading = family.ends, 1.0
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
         solutions, ends, heading = solutions[::-1], (ends[1], ends[0]), -1.0

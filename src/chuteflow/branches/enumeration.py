@@ -7,7 +7,7 @@ that meet the condition are where the quantity takes its value (:mod:`chuteflow.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,7 +80,9 @@ def flows(
         wider = _wider(found, which, value)
         if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
             break
-        found = _search(problem, which, value, tolerance, wider)
+        # The grid over another range resolves other flows.
+        before, found = found, _search(problem, which, value, tolerance, wider)
+        found = replace(found, solutions=_distinct([*found.solutions, *before.solutions], which))
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),

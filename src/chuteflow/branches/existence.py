@@ -12,6 +12,7 @@ import numpy as np
 from chuteflow.branches.ranges import Range
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.model import LOSS, WORK, Model
+from chuteflow.theory.bases import BASES
 from chuteflow.theory.hot import LAMBDA_C, dilute, hot_parameters
 
 _NAMES = ("Q", "h", "M", "T_surface")
@@ -44,6 +45,9 @@ def imbalance(model: Model) -> str:
                 "and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
+    if model.beta != 0.0 or model.base != BASES["richman"]:
+        # The hot limit is known for laws with a temperature far above and for the base of the paper.
+        return "no flow balances the energy gained and lost"
     limit = dilute(model.law, chute.restitution, chute.slope)
     hot = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     if hot.delta > 0.0 and hot.F21 > 0.0 and hot.lambda_ > LAMBDA_C:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -27,6 +27,8 @@ _OTHERS = (0, 1, 2, 4, 8, 16)
 #: Rough flows closer than this tell no direction; flows are solved at the second spacing, or where the branch has
 #: turned by an angle of the cosine.
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
+#: The same at larger hold-ups: there flows wind, and one between two others is a start only where these are near.
+_DEEP, _SPACING_DEEP = 5.0, 0.12
 #: Reaches over which the direction of a rough branch is looked for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
@@ -37,6 +39,12 @@ _ROUGH, _ASTRAY = 0.03, 0.3
 #: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
+#: So near where the rough quantity turns, since a fold is not known as well; it turns where it is nearest to the value
+#: within the second length along the branch, and further away by the third to both sides.
+_NEAR_TURN, _AROUND, _RISE = 0.08, 0.15, 0.01
+#: A rough branch that is not longer, and as near to another, may be a piece of that one: where the residual is near to
+#: zero all along, its signs are not known well enough to join them.
+_SHORT, _BESIDE = 0.15, 0.15
 #: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
 #: least the second; and there by more than so many times of what the rough flow was wrong by.
 _STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
@@ -61,11 +69,15 @@ _REMEMBERED = 4
 class Family:
     """A branch of flows in a range: rough flows in order, of which any are solved on request.
 
-    ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3.
+    ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3. ``pieces`` are short branches near to this one which
+    may belong to it: the place of the nearest rough flow here, and their rough quantities. Such a piece is not
+    ``separate``.
     """
 
     rough: RoughBranch
     within: Range
+    pieces: tuple[tuple[int, Array], ...] = ()
+    separate: bool = True
 
     @property
     def macroscopic(self) -> Array:
@@ -111,7 +123,9 @@ class Family:
                 weights = np.zeros(4)
                 weights[edge[0]], value = sign, sign * edge[1]
         point = point_at(self.rough.start(i), weights, value, tolerance)
-        if point is None or np.linalg.norm(point.m - self.macroscopic[i]) > _ROUGH + _ASTRAY * _SPACING + self._bend(i):
+        if point is None or np.linalg.norm(
+            point.m - self.macroscopic[i]
+        ) > _ROUGH + _ASTRAY * _SPACING_DEEP + self._bend(i):
             return None
         return point
 
@@ -129,29 +143,33 @@ class Family:
     def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
-        it.
+        it, and goes away from it beyond, so that a fold near to the target lies between.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
 
-        def agrees(i: int) -> Point | None:
-            point = self.solved(i, tolerance)
-            off = self.macroscopic[i, which] - target
-            return point if point is not None and (point.m[which] >= target) == (off >= 0.0) else None
-
-        def outermost(places: list[int]) -> tuple[int, Point]:
-            found = next(((i, point) for i in places if (point := agrees(i)) is not None), None)
-            if found is None:
+        def tried(places: list[int], outward: float) -> tuple[int, Point]:
+            """The first that is on its side, where the quantity goes away from the target outwards; or is on its
+            side at least."""
+            second = None
+            for i in places:
+                point, off = self.solved(i, tolerance), float(self.macroscopic[i, which]) - target
+                if point is None or (point.m[which] >= target) != (off >= 0.0):
+                    continue
+                if outward * point.tangent[which] * (1.0 if off >= 0.0 else -1.0) > 0.0:
+                    return i, point
+                second = second or (i, point)
+            if second is None:
                 raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
-            return found
+            return second
 
         # Outwards, and from an end of the branch inwards.
         whole, middle = len(self.macroscopic) - 1, (begin + end) // 2
         sign = -1 if begin > 0 else 1
-        begin, first = outermost([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle])
+        begin, first = tried([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle], -1.0)
         sign = 1 if end < whole else -1
-        end, last = outermost([i for k in _OTHERS if middle < (i := end + sign * k) <= whole])
+        end, last = tried([i for k in _OTHERS if middle < (i := end + sign * k) <= whole], 1.0)
         inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
@@ -187,16 +205,17 @@ class Family:
     def _spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
         length = self.arclength
-        least, most = _TOO_NEAR, _SPACING
+        spacing = np.where(self.macroscopic[:, LOG_M] > np.log(_DEEP), _SPACING_DEEP, _SPACING)
+        least, most = _TOO_NEAR, np.inf
         if self.rough.closed:
-            least, most = min(least, length[-1] / 16.0), min(most, length[-1] / 8.0)
+            least, most = min(least, length[-1] / 16.0), length[-1] / 8.0
         kept, ahead = [begin], self._direction(begin)
         for i in range(begin + 1, end):
             step = length[i] - length[kept[-1]]
             if step < least:
                 continue
             here = self._direction(i)
-            if here is not None and (step > most or ahead is None or float(here @ ahead) < _TURNED):
+            if here is not None and (step > min(most, spacing[i]) or ahead is None or float(here @ ahead) < _TURNED):
                 kept.append(i)
                 ahead = here
         return [*kept, end] if end > begin else kept
@@ -205,7 +224,25 @@ class Family:
 @lru_cache(maxsize=_REMEMBERED)
 def families(model: Model, within: Range) -> tuple[Family, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
-    return tuple(Family(branch, within) for branch in search(model, within).branches if len(branch) > 1)
+    found = [Family(branch, within) for branch in search(model, within).branches if len(branch) > 1]
+    pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
+    separate = [True] * len(found)
+    for i, short in enumerate(found):
+        if short.arclength[-1] > _SHORT:
+            continue
+        nearest = [
+            (float(apart.min()), k, int(apart.min(axis=0).argmin()))
+            for k, other in enumerate(found)
+            if other.arclength[-1] > _SHORT
+            for apart in [np.linalg.norm(short.macroscopic[:, None] - other.macroscopic, axis=-1)]
+        ]
+        distance, k, place = min(nearest, default=(np.inf, 0, 0))
+        if distance < _BESIDE:
+            pieces[k].append((place, short.macroscopic))
+            separate[i] = False
+    return tuple(
+        replace(f, pieces=tuple(p), separate=alone) for f, p, alone in zip(found, pieces, separate, strict=True)
+    )
 
 
 def search(model: Model, within: Range) -> TrajectoryGrid:
@@ -248,22 +285,52 @@ def crossings(
     target = float(np.log(value))
     m = family.macroscopic
     off = m[:, which] - target
-    bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
-    spacing = np.diff(family.arclength, prepend=0.0)
-    rough = NEAR + _PER_SPACING * np.maximum(spacing, np.append(spacing[1:], 0.0))
-    near = np.abs(off) < rough + np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    near = np.abs(off) < _doubt_of(off, family.arclength)
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
+    near[_turns_near(off, family.arclength)] = True
+    for place, piece in family.pieces:
+        there = piece[:, which] - target
+        if np.abs(there).min() < _NEAR_TURN or (there >= 0.0).any() != (off[place] >= 0.0):
+            near[place] = True
     found: list[Solution] = []
     lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
         single = _solve_single(family, which, target, off, begin, end, tolerance)
         solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
-        if solved is None:
+        if solved is None and family.separate:
             lost += [m[i] for i in changes.tolist() if begin <= i < end]
-        else:
-            found += solved
+        found += solved or []
     return found, lost
+
+
+def _doubt_of(off: Array, arclength: Array) -> Array:
+    """By how much a rough quantity (k,) may be wrong at its places, and reach further between them: most where it
+    turns before it is zero, since the fold lies between two places."""
+    steps, lengths = np.diff(off), np.maximum(np.diff(arclength), 1e-300)
+    spacing = np.maximum(np.append(0.0, lengths), np.append(lengths, 0.0))
+    bend = np.abs(np.diff(off, 2, prepend=off[0], append=off[-1]))
+    slope = np.concatenate([[0.0, 0.0], np.abs(steps) / lengths, [0.0, 0.0]])
+    steepest = np.max([slope[i : i + len(off)] for i in range(4)], axis=0)
+    away = np.diff(np.abs(off)) >= 0.0
+    turns = np.concatenate([[False], away[1:] & ~away[:-1], [False]])
+    bends = np.maximum(np.maximum(bend, np.roll(bend, 1)), np.roll(bend, -1))
+    return NEAR + _PER_SPACING * spacing + bends + np.where(turns, steepest * spacing, 0.0)
+
+
+def _turns_near(off: Array, arclength: Array) -> list[int]:
+    """Rough flows at which a quantity comes nearest to its value without passing it, and turns."""
+    away = np.abs(off)
+    found = []
+    for i in (np.flatnonzero(away[1:-1] < _NEAR_TURN) + 1).tolist():
+        first = int(np.searchsorted(arclength, arclength[i] - _AROUND))
+        last = int(np.searchsorted(arclength, arclength[i] + _AROUND, side="right"))
+        before, after = away[first:i], away[i + 1 : last]
+        least = min(before.min(initial=np.inf), after.min(initial=np.inf))
+        crossed = (off[i - 1] >= 0.0) != (off[i] >= 0.0) or (off[i] >= 0.0) != (off[i + 1] >= 0.0)
+        if not crossed and least >= away[i] and min(before.max(initial=0.0), after.max(initial=0.0)) > away[i] + _RISE:
+            found.append(i)
+    return found
 
 
 def _is_behind(point: Point, last: Point) -> bool:
@@ -274,7 +341,7 @@ def _is_behind(point: Point, last: Point) -> bool:
     if length < 0.5 * _TOO_NEAR:
         return length < _SAME or ahead < 0.5 * length
     # On the same side of the branch, and further back on it.
-    return length < _SPACING and ahead < 0.0 and alike > _SHARP
+    return length < _SPACING_DEEP and ahead < 0.0 and alike > _SHARP
 
 
 def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
@@ -438,6 +505,6 @@ def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[Trace
         pieces = family.traced(tolerance)
         found += pieces
         inside = [m for m in family.macroscopic if within.contains(m)]
-        if len(inside) > 1 and not pieces:
+        if len(inside) > 1 and not pieces and family.separate:
             lost.append(inside[len(inside) // 2])
     return found, lost

@@ -10,6 +10,7 @@ import numpy as np
 
 from chuteflow.branches.results import Branch
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.kinds import INVERTED, MONOTONIC
 from chuteflow.steady.mapped.curve import MappedCurve
 from chuteflow.steady.mapped.solution import MappedSolution
 
@@ -63,7 +64,7 @@ def runs(branch: SteadyBranch) -> list[Run]:
         turns = point.special == "density-inversion"
         if turns or (not point.special and point.flow.density != kind):
             found.append(Run(kind, tuple(current)))
-            kind = {"inverted": "monotonic", "monotonic": "inverted"}[kind] if turns else point.flow.density
+            kind = {INVERTED: MONOTONIC, MONOTONIC: INVERTED}[kind] if turns else point.flow.density
             current = [point.flow]
     return [*found, Run(kind, tuple(current))]
 

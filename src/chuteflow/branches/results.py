@@ -54,8 +54,8 @@ class FlowSet(Sequence[Flow]):
     incomplete: str | None = None
 
     def __repr__(self) -> str:
-        warmth = display.listed([flow.surface_temperature for flow in self.flows])
-        found = f"T_surface = {warmth}" if self.flows else self.reason
+        temperatures = display.listed([flow.surface_temperature for flow in self.flows])
+        found = f"T_surface = {temperatures}" if self.flows else self.reason
         return display.line("FlowSet", display.counted(len(self), "flow"), found)
 
     def _repr_html_(self) -> str:

@@ -107,6 +107,21 @@ def range_options(slope: str) -> Callable[[Command], Command]:
     )
 
 
+closure_options = _options(
+    option(
+        "--closure",
+        metavar="NAME",
+        help="Constitutive law: lun (the default), another of `chuteflow closures`, or FILE.py:NAME.",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="A parameter of the closure, such as --set packing=0.64; as often as there are any. "
+        "Or as part of its name: --closure extended:packing=0.64,radial=torquato.",
+    ),
+)
 chute_options = _options(
     option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
     option("--angle", type=Number(), help="Inclination theta in degrees."),
@@ -116,7 +131,10 @@ chute_options = _options(
         if key != "slope"
     ),
     option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
-    option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier."),
+    closure_options,
+    option(
+        "--base", metavar="NAME", help="Base: richman (the default), or johnson-jackson:specularity=0.5 and the like."
+    ),
 )
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
@@ -169,11 +187,25 @@ def chute(given: Mapping[str, Any]) -> Chute:
     if missing:
         raise InputError(f"missing {'; '.join(missing)}")
     others: dict[str, Any] = {parameter.name: given[parameter.key] for parameter in material}
-    others |= {name: given[name] for name in ("surface", "closure") if given[name] is not None}
+    others |= words(given)
     if given["angle"] is not None:
         return Chute.at_angle(given["angle"], **others)
     others["slope"] = given["slope"]
     return Chute(**others)
+
+
+def words(given: Mapping[str, Any]) -> dict[str, str]:
+    """Surface and closure of the options, as far as they are given, as arguments of a Chute.
+
+    Raises:
+        InputError: for parameters of the closure that are not KEY=VALUE.
+    """
+    found = {name: given[name] for name in ("surface", "closure", "base") if given.get(name) is not None}
+    if given["settings"]:
+        from chuteflow.theory.laws import settings_added
+
+        found["closure"] = settings_added(found.get("closure", "lun"), given["settings"])
+    return found
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:

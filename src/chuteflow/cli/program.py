@@ -19,6 +19,7 @@ import click
 from chuteflow import __version__
 from chuteflow.cli import interrupts
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.threads import limit_process
 
@@ -36,7 +37,7 @@ class Commands(click.Group):
         """The command of this name."""
         if cmd_name not in COMMANDS:
             return None
-        return import_module(f"chuteflow.cli.commands.{cmd_name}").command
+        return import_module(f"chuteflow.cli.commands.{cmd_name.replace('-', '_')}").command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -99,9 +100,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _complain(str(error), FAILED)
     except (click.Abort, KeyboardInterrupt, interrupts.Interrupted) as error:
         interrupts.told()
-        if sys.stderr.isatty():
-            # A line of progress may stand there.
-            click.echo("\r\x1b[K", nl=False, err=True)
+        Progress().clear()  # of a command that was interrupted
         return _complain(str(error) or "interrupted", interrupts.INTERRUPTED)
     except SystemExit:
         # This is how click ends where whoever read has gone.

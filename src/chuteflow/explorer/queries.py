@@ -12,7 +12,7 @@ from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.quantities import Scales
-from chuteflow.theory.laws import LAWS
+from chuteflow.theory.laws import LAWS, runs_code
 
 Query = Mapping[str, str]
 
@@ -62,7 +62,14 @@ class Choice:
 
 
 _SURFACES = {"free": "free, thinning out for ever", "interface": "interface, free flights above"}
-_CLOSURES = {"lun": "Lun et al. 1984", "lun-fourier": "Lun, heat by Fourier's law alone"}
+_CLOSURES = {
+    "lun": "Lun et al. 1984",
+    "lun-fourier": "Lun, heat by Fourier's law alone",
+    "garzo-dufty": "Garzó & Dufty 1999",
+    "garzo-dufty-fourier": "Garzó & Dufty, heat by Fourier's law alone",
+    "extended": "Extended, Berzi 2014",
+    "jenkins-berzi": "Extended, Jenkins & Berzi 2010",
+}
 CHOICES = {
     "surface": Choice(
         "Surface", {name: _SURFACES.get(name, name) for name in SURFACES}, "What is assumed above the colliding grains."
@@ -114,6 +121,8 @@ def read(query: Query, *, other: tuple[str, ...] = (), optional: tuple[str, ...]
     missing = [name for name in needed if name not in given]
     if missing:
         raise InputError(f"missing {', '.join(missing)}: for example {missing[0]}={_BASE.get(missing[0], 'slope')}")
+    if runs_code(given["closure"]):
+        raise InputError("closure: a page may not run files: take one by its name, with parameters as name:key=value")
     chute: dict[str, Any] = {
         long: given[short] if short in _DEFAULTS else number_in(short, given[short])
         for short, long in PARAMETERS.items()

@@ -38,6 +38,7 @@ def boundaries_object(found: BoundarySet) -> dict[str, Any]:
             "skipped": list(found.skipped),
         },
         "reason": found.reason,
+        "incomplete": found.incomplete,
     }
 
 

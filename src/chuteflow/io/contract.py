@@ -17,6 +17,7 @@ from chuteflow.parameters import BY_KEY, NAMES
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
+from chuteflow.theory.constitutive import Law, digest
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
 PARAMETERS = {key: parameter.name for key, parameter in BY_KEY.items()} | {name: name for name in NAMES}
@@ -32,6 +33,7 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
         "searched": searched_object(flow_set.chute, flow_set.searched, scales),
         "reason": flow_set.reason,
         "incomplete": flow_set.incomplete,
+        "closure": closure_object(flow_set.chute, flow_set[0].law if len(flow_set) else None),
         **_units(scales, NUMBERS),
     }
 
@@ -41,6 +43,7 @@ def single_flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, An
     return {
         "chute": chute_object(flow.chute),
         "flows": [flow_object(flow, scales)],
+        "closure": closure_object(flow.chute, flow.law),
         **_units(scales, NUMBERS),
     }
 
@@ -52,6 +55,7 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
         "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
         "counts": [_count(curve.chute, count, scales) for count in flux_counts(curve)],
         "searched": searched_object(curve.chute, curve.searched, scales),
+        "closure": closure_object(curve.chute),
         "reason": curve.reason,
         "incomplete": curve.incomplete,
         **_units(scales, PLACE),
@@ -60,7 +64,24 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
 
 def chute_object(chute: Chute) -> dict[str, float | str]:
     """The parameters of a chute."""
-    return {short: getattr(chute, name) for short, name in PARAMETERS.items()}
+    values = chute.as_dict()
+    named = {short: values[name] for short, name in PARAMETERS.items()}
+    return named | ({"base": values["base"]} if "base" in values else {})
+
+
+def closure_object(chute: Chute, known: Law | None = None) -> dict[str, Any]:
+    """The law of a chute whole: its name, parameters and source, and a digest of its values for these grains."""
+    law = known or chute.law
+    return {
+        "name": law.name,
+        "asked": str(chute.closure),
+        "description": law.description,
+        "source": law.source,
+        "valid": law.valid,
+        "densest": law.densest,
+        "parameters": law.parameters,
+        "digest": digest(law, chute.restitution, chute.slope),
+    }
 
 
 def flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
@@ -153,11 +174,11 @@ def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:
 
 def searched_object(chute: Chute, searched: Searched, scales: Scales | None = None) -> dict[str, Any]:
     """The range searched, and the cells of the search where they were counted."""
-    warmth = factor("surface_temperature", chute, scales)
+    scale = factor("surface_temperature", chute, scales)
     cells = searched.cells
     counted = {} if cells is None else {"delta": cells.delta, "cells": cells.number, "undecided": cells.undecided}
     return {
-        "T_surface": [finite(value * warmth) for value in searched.surface_temperature],
+        "T_surface": [finite(value * scale) for value in searched.surface_temperature],
         "M_max": finite(searched.largest_holdup * factor("mass_holdup", chute, scales)),
         **counted,
     }

@@ -23,6 +23,7 @@ from chuteflow.io.contract import SHORT
 from chuteflow.io.csv_file import kept_in, lines_of, require_columns
 from chuteflow.io.records import (
     CHECKSUM,
+    CLOSURE,
     LAW,
     checksum,
     chute_from,
@@ -137,6 +138,7 @@ def _kept(found: Domain) -> dict[str, Any]:
         "kind": KIND,
         "chute": contract.chute_object(plane.chute),
         LAW: fingerprint_of(plane.chute),
+        CLOSURE: contract.closure_object(plane.chute),
         "axes": [[axis.name, axis.low, axis.high] for axis in (plane.x, plane.y)],
         "size": [len(found.x), len(found.y)],
         "temperatures": list(plane.temperatures),
@@ -159,7 +161,7 @@ def _restored(kept: Mapping[str, Any]) -> Domain:
         InputError: for a later format, or for what is no map.
     """
     require_format(kept)
-    chute = chute_from(kept["chute"])
+    chute = chute_from(kept)
     require_law(chute, kept)
     x, y = (Axis(str(name), low, high) for name, low, high in kept["axes"])
     surface_temperature, deepest = kept["searched"]

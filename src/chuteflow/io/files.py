@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from chuteflow.errors import InputError
+from chuteflow.io import contract
 from chuteflow.io.records import KIND_OF, Result
 from chuteflow.io.writing import require_suffix, require_writable, write_whole
 from chuteflow.steady.quantities import Scales
@@ -54,6 +56,21 @@ def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | N
     stream = BytesIO()
     domain_records.write(found, stream, suffix)
     write_whole(path, stream.getvalue())
+
+
+def write_answer(
+    path: str | os.PathLike[str], content: Callable[[], Any], rows: Callable[[], Iterable[Sequence[str]]]
+) -> None:
+    """Write the object ``content`` to a JSON file, or ``rows`` to a CSV file, as the ending of ``path`` says.
+
+    Raises:
+        InputError: where the file cannot be written.
+    """
+    if str(path).lower().endswith(".json"):
+        text = contract.text(content())
+    else:
+        text = "\n".join(",".join(row) for row in rows())
+    write_whole(path, text + "\n")
 
 
 def load(path: str | os.PathLike[str]) -> Result | Domain:

@@ -26,12 +26,11 @@ from chuteflow.io.contract import factor, finite
 from chuteflow.io.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.io.references import PAPER, TITLES, numbers_are
 from chuteflow.steady.collocation import WHOLE
+from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.steady.quantities import FIELDS, NUMBERS, VALIDITY, Quantity, Scales
 from chuteflow.steady.solver import Status
 from chuteflow.steady.validity import WORDS
 
-_INTERIORS = ("dissipative", "mixed", "productive")
-_DENSITIES = ("monotonic", "inverted")
 _STATUS = tuple(Status)
 #: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
 _LARGEST = 50_000_000
@@ -153,8 +152,8 @@ def _write_numbers(file: h5netcdf.File, found: Sequence[Row], scales: Scales | N
 def _write_kinds(file: h5netcdf.File, found: Sequence[Row]) -> None:
     flows = [row.flow for row in found]
     for name, meanings, long_name in (
-        ("interior", _INTERIORS, "balance of fluctuation energy inside the flow"),
-        ("density", _DENSITIES, "course of the volume fraction with height"),
+        ("interior", INTERIORS, "balance of fluctuation energy inside the flow"),
+        ("density", DENSITIES, "course of the volume fraction with height"),
     ):
         _write_flags(file, name, [getattr(flow, name) for flow in flows], meanings, long_name)
     status = [flow.solution.status.name.lower() for flow in flows]

@@ -21,7 +21,7 @@ from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import KINDS, Branch, Cells, Curve, FlowSet, Searched, SpecialPoint
 from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError
-from chuteflow.io.contract import PARAMETERS, chute_object, finite
+from chuteflow.io.contract import PARAMETERS, chute_object, closure_object, finite
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import WHOLE, Collocation
@@ -29,8 +29,8 @@ from chuteflow.steady.elements import DEGREES, MOST_PIECES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import Solution, Status, checked_tolerance
-from chuteflow.theory.constitutive import Law, fingerprint
-from chuteflow.theory.laws import law
+from chuteflow.theory.constitutive import Law, Unknown, fingerprint
+from chuteflow.theory.laws import law, runs_code
 
 #: What can be saved and loaded, and its names in the files.
 Result = Flow | FlowSet | Curve
@@ -47,7 +47,7 @@ _LARGEST_STRETCH = 100.0
 #: Relative difference of values of one law on two machines.
 _SAME_LAW = 1e-9
 #: Names in the head of a file.
-LAW, CHECKSUM = "law", "checksum"
+LAW, CLOSURE, CHECKSUM = "law", "closure", "checksum"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,7 @@ def head(result: Result, found: Sequence[Row]) -> dict[str, Any]:
         "kind": KIND_OF[type(result)],
         "chute": chute_object(result.chute),
         LAW: fingerprint_of(result.chute, found[0].flow.law if found else None),
+        CLOSURE: closure_object(result.chute, found[0].flow.law if found else None),
     }
     if not isinstance(result, Flow):
         kept |= {
@@ -113,7 +114,7 @@ def require_checksum(kept: Mapping[str, Any], rows: Iterable[Mapping[str, Any]] 
 
 def fingerprint_of(chute: Chute, registered: Law | None = None) -> list[float]:
     """Values of the law of ``chute``, by default the one that has its name now."""
-    return fingerprint(registered or law(chute.closure), chute.restitution, chute.slope)
+    return fingerprint(registered or chute.law, chute.restitution, chute.slope)
 
 
 def require_law(chute: Chute, kept: Mapping[str, Any]) -> None:
@@ -122,7 +123,7 @@ def require_law(chute: Chute, kept: Mapping[str, Any]) -> None:
     Raises:
         InputError: where it is another.
     """
-    if LAW not in kept:
+    if LAW not in kept or not chute.law.known:
         return
     values, now = numbers("the law", kept[LAW]), np.array(fingerprint_of(chute))
     if values.shape != now.shape or not np.allclose(values, now, rtol=_SAME_LAW, atol=0.0):
@@ -146,12 +147,24 @@ def numbers(what: str, values: Any) -> Array:
 def unknowns(row: Row) -> dict[str, Any]:
     """A discretised flow and its place in the result, as JSON values."""
     solution = row.flow.solution
-    breaks = solution.problem.breaks
+    problem = solution.problem
+    grid = _grid(problem.degree, float(np.reshape(problem.stretch, ())), problem.breaks, solution.z.tolist())
+    return grid | _place(row)
+
+
+def _unknowns_read(row: Row, kept: Mapping[str, Any]) -> dict[str, Any]:
+    """The same of a flow whose law is not known here: its unknowns are those that were read."""
+    return _grid(kept["degree"], kept["stretch"], _breaks(kept.get("breaks")), kept["z"]) | _place(row)
+
+
+def _grid(degree: int, stretch: float, breaks: Sequence[float], z: Sequence[float]) -> dict[str, Any]:
     pieces = {"breaks": list(breaks)} if len(breaks) > len(WHOLE) else {}
-    return pieces | {
-        "degree": solution.problem.degree,
-        "stretch": float(np.reshape(solution.problem.stretch, ())),
-        "z": solution.z.tolist(),
+    return pieces | {"degree": degree, "stretch": stretch, "z": list(z)}
+
+
+def _place(row: Row) -> dict[str, Any]:
+    solution = row.flow.solution
+    return {
         "macroscopic": [finite(value) for value in solution.macroscopic],
         "error": finite(solution.error),
         "status": solution.status.name,
@@ -178,8 +191,12 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     status = Status[kept["status"]]
     logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
     error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
-    solution = Solution(np.array(logarithms), error, status, (Collocation(model(chute), degree, stretch, breaks), z))
-    if solution.converged:
+    if chute.law.known:
+        source: Any = Collocation(model(chute), degree, stretch, breaks), z
+    else:
+        source = chute.law
+    solution = Solution(np.array(logarithms), error, status, source)
+    if solution.converged and chute.law.known:
         with np.errstate(all="ignore"):
             distance = np.abs(solution.problem.state(z).macroscopic() - solution.macroscopic).max()
         if not distance <= _AGREEMENT:
@@ -201,8 +218,33 @@ def _breaks(kept: Any) -> tuple[float, ...]:
 
 
 def chute_from(kept: Mapping[str, Any]) -> Chute:
-    """The chute that ``chute_object`` came from."""
-    return Chute(**{name: kept[short] for short, name in PARAMETERS.items()})
+    """The chute of the head of a file, with a law without a function where its own is not registered here, or is in a
+    Python file that was not asked for in this process.
+
+    Raises:
+        InputError: for parameters out of range.
+    """
+    values = {name: kept["chute"][short] for short, name in PARAMETERS.items()}
+    values["base"] = kept["chute"].get("base", "richman")
+    described = isinstance(kept.get(CLOSURE), Mapping)
+    try:
+        # To read a file must not run another that it names.
+        if described and runs_code(values["closure"]):
+            values["closure"] = _unknown_law(kept[CLOSURE])
+        law(values["closure"])
+    except InputError:
+        if not described:
+            raise
+        values["closure"] = _unknown_law(kept[CLOSURE])
+    return Chute(**values)
+
+
+def _unknown_law(kept: Mapping[str, Any]) -> Law:
+    name, asked, description, source, valid = (
+        str(kept[key]) for key in ("name", "asked", "description", "source", "valid")
+    )
+    densest = number("the densest packing of the law", kept["densest"], 0.0, 1.0)
+    return Law(name, description, source, densest, Unknown(asked), valid=valid, spec=asked)
 
 
 def restored(kept: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> Result:
@@ -212,11 +254,11 @@ def restored(kept: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> Resu
         InputError: for a head of a later format, numbers out of range, or rows that do not fit it.
     """
     require_format(kept)
-    chute = chute_from(kept["chute"])
+    chute = chute_from(kept)
     require_law(chute, kept)
     found = [row_from(chute, row) for row in rows]
     result = _result(chute, kept, found)
-    require_checksum(kept, map(unknowns, found))
+    require_checksum(kept, map(unknowns, found) if chute.law.known else map(_unknowns_read, found, rows))
     return result
 
 

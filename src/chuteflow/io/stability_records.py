@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from chuteflow.branches.results import FlowSet
 from chuteflow.io.contract import chute_object, finite, flow_object, searched_object
-from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.answers import Answer
+from chuteflow.stability.budget import Budget
 from chuteflow.stability.modes import Mode
 from chuteflow.stability.verdict import Stability
-from chuteflow.steady.flow import Flow
 
 #: The disturbed fields, in the order of :attr:`Mode.fields`.
 FIELDS = ("nu", "u", "v", "w", "T")
 #: Columns of a CSV file.
 COLUMNS = ("Q", "h", "M", "T_surface", "stable", "kind", "kx", "ky", "growth", "frequency", "speed", "error")
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What is known of one flow: its stability and its leading modes, or in ``reason`` why it is not known."""
-
-    flow: Flow
-    found: Stability | None
-    modes: tuple[Mode, ...]
-    reason: str | None
 
 
 def answers_object(flows: FlowSet, answers: Sequence[Answer], *, fields: bool = False) -> dict[str, Any]:
@@ -100,7 +89,7 @@ def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
         "stable": None if found is None else found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
-        "budget": None if not answer.modes else budget_object(energy_budget(answer.modes[0])),
+        "budget": None if answer.budget is None else budget_object(answer.budget),
         "grows": None if found is None or found.mode is None else found.grows,
         "threshold": None if found is None else found.smallest_rate,
         "wavenumbers": None if found is None else list(found.searched),

@@ -46,9 +46,9 @@ def notes(flows: Sequence[Flow]) -> list[str]:
 
 def validity(flows: Sequence[Flow], chute: Chute, scales: Scales | None) -> Iterator[str]:
     """How far the flows of a family keep to the theory, a line for each stretch of their surface temperatures."""
-    warmth = factor("surface_temperature", chute, scales)
+    scale = factor("surface_temperature", chute, scales)
     for summary, stretch in groupby(flows, key=lambda flow: flow.validity.summary):
-        ends = [flow.surface_temperature * warmth for flow in stretch]
+        ends = [flow.surface_temperature * scale for flow in stretch]
         yield f"from T_surface = {number(ends[0])} to {number(ends[-1])}: {summary}"
 
 
@@ -61,7 +61,7 @@ def chute(chute: Chute) -> str:
     """All parameters of ``chute``."""
     slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
     numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
-    return f"chute: {numbers}, {_SURFACES[chute.surface]}, closure {chute.closure}"
+    return f"chute: {numbers}, {_SURFACES[chute.surface]}, {chute.laws}"
 
 
 def scales(scales: Scales) -> str:
@@ -77,8 +77,8 @@ def in_own_units(sentence: str, scales: Scales | None) -> str:
 
 def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
     """The range searched."""
-    warmth, mass = factor("surface_temperature", chute, scales), factor("mass_holdup", chute, scales)
-    low, high = (value * warmth for value in range_.surface_temperature)
+    temperature, mass = factor("surface_temperature", chute, scales), factor("mass_holdup", chute, scales)
+    low, high = (value * temperature for value in range_.surface_temperature)
     return (
         f"searched: T_surface from {low:.4g} to {high:.4g}{_unit('surface_temperature', scales)}, "
         f"M up to {range_.largest_holdup * mass:.4g}{_unit('mass_holdup', scales)}"

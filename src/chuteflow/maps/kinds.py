@@ -8,14 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow.branches.counting import most_at_once
 from chuteflow.branches.rough_turns import dips
 from chuteflow.maps.zeros import Index, Zeros, lagrange, thinned, zeros_on
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import TrajectoryGrid
 
 #: Bits of the kinds that are present among the flows of a chute.
-INTERIORS = {"dissipative": 1, "mixed": 2, "productive": 4}
-DENSITIES = {"monotonic": 1, "inverted": 2}
+INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
+DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
 #: Turns of ln Q along a family are told apart if they differ by more.
 _TURN = 1e-6
 #: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
@@ -57,7 +59,9 @@ def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) 
         found = _present(zeros, kept)
         interior |= sum(bit for bit, there in zip(INTERIORS.values(), found[:3], strict=True) if there)
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
-    return Kinds(tuple(map(bool, at.tolist())), _most(np.concatenate(pieces)), len(lines), interior, density)
+    return Kinds(
+        tuple(map(bool, at.tolist())), most_at_once(np.concatenate(pieces), _TURN), len(lines), interior, density
+    )
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:
@@ -84,7 +88,7 @@ def _present(zeros: Zeros, line: Index) -> list[bool]:
 
 def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
     """By how much flows are of each kind, (k,) each, given bounds (3, k) of the least and the largest net loss and the
-    largest p dtheta/dp, and the doubt about these (3, k): a sign in doubt makes no flow mixed and no density
+    largest 1 - p dL/dp, and the doubt about these (3, k): a sign in doubt makes no flow mixed and no density
     inverted."""
     return [
         lower[0] + doubt[0],
@@ -149,14 +153,6 @@ def _confirmed(stops: list[float], rises: float) -> list[float]:
             del stops[i : i + 2]
             i -= 1
     return stops
-
-
-def _most(pieces: Array) -> int:
-    """The largest number of stretches (pieces, 2) over one point."""
-    low, high = pieces.T
-    edges = np.concatenate([low + _TURN, high])
-    order = np.lexsort((np.repeat([1, 0], len(low)), edges))
-    return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
 def _peak(values: Array) -> float:

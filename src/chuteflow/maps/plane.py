@@ -21,9 +21,9 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import model
-from chuteflow.theory.constitutive import Law
+from chuteflow.theory.bases import require_richman
+from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
-from chuteflow.theory.laws import law
 from chuteflow.trajectories.refining import TrajectoryGrid, carry_down_for, starts
 from chuteflow.trajectories.tables import ENTRIES, envelope
 
@@ -93,7 +93,9 @@ class Plane:
             raise InputError(f"both axes are {self.x.name}: give two parameters")
         for x in (self.x.low, self.x.high):
             for y in (self.y.low, self.y.high):
-                self.at(x, y)
+                corner = self.at(x, y)
+                require_richman(corner.base, "maps are")
+                require_limit(corner.law, corner.restitution, corner.slope, "maps need")
 
     def at(self, x: float, y: float) -> Chute:
         """The chute at values of the two parameters."""
@@ -141,7 +143,7 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
-    grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), law(chute.closure))
+    grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
     return kinds(grid.of_base(model(chute)), extremes, plane.temperatures)
 
 
@@ -152,7 +154,7 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
     """
     chute = plane.chute_at(outer, inner)
-    closure = law(chute.closure)
+    closure = chute.law
     limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
     found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     gained, lost = found.F21 > 0.0, found.delta > 0.0

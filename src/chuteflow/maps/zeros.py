@@ -18,7 +18,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.compiled import compiled
 from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, LOSS, WORK
 from chuteflow.trajectories import kernel
-from chuteflow.trajectories.kernel import S_G, S_L, S_T, S_Y
+from chuteflow.trajectories.kernel import DILUTE, DILUTE_WEIGHT, S_G, S_L, S_T, S_Y
 from chuteflow.trajectories.refining import TrajectoryGrid
 
 Index = NDArray[np.int64]
@@ -39,7 +39,7 @@ _TOLD = 1e-7
 class Zeros:
     """The zeros of B on a grid, (Z,) each: ln Q, ln M, ln T_surface; ``rise``, the derivative of ln Q along the zeros
     to a factor of one sign on each branch; ``extremes`` (Z, 6) lower and upper bounds of the least and the largest net
-    loss and the largest p dtheta/dp, and how far these are in ``doubt`` (Z, 3) for their place between states."""
+    loss and the largest 1 - p dL/dp, and how far these are in ``doubt`` (Z, 3) for their place between states."""
 
     grid: TrajectoryGrid
     log_q: Array
@@ -120,12 +120,12 @@ class _Known:
         p = over + model.surface_stress
         big_l, y, _t, _h, glide = grid.states[places].T
         f, df = model.closures(np.exp(big_l))
-        base, base_slope = model.base_flux(f), model.slope * model.slip_slope(df)
+        base, base_slope = model.base_flux(f), model.base_flux_slope(df)
         slip = model.slip(f)
         root_t = np.exp(0.5 * (np.log(p) + f[GAMMA] - big_l))
         sliding = slip * root_t * over
         flux = sliding + glide
-        turn = p * y / f[CONDUCTION]
+        turn = p * y / f[CONDUCTION] - model.beta
         still = 1.0 - turn
         warming = turn + f[COUPLING] * still
         dilation, share = over / p, sliding / flux
@@ -148,7 +148,8 @@ class _Known:
 def _labels(grid: TrajectoryGrid, around: Index) -> tuple[Array, NDArray[np.bool_]]:
     """Labels (k, n) of neighbours on the curve, to a factor for each row, and whether they are in one piece (n - 1)."""
     state = grid.states[around]
-    place = np.where(state[..., S_L] > -7.0, state[..., S_L], -7.0 + 0.1 * (state[..., S_L] + 7.0))
+    big_l = state[..., S_L]
+    place = np.where(big_l > DILUTE, big_l, DILUTE + DILUTE_WEIGHT * (big_l - DILUTE))
     apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / grid.scale)
     gaps = np.diff(state[..., S_T], axis=1)
     told = (gaps > _TOLD).all(axis=1, keepdims=True)
@@ -177,12 +178,13 @@ def _across(grid: TrajectoryGrid, places: Index, rows: Index) -> Array:
     left, right = joined[:, 1] & ~three & ~five, joined[:, 2] & ~joined[:, 1]
     out[left] = values[left, 2] - values[left, 1]
     out[right] = values[right, 3] - values[right, 2]
-    # The same label from neighbour to neighbour: derivatives of one state are compared with each other alone.
+    # Each state has its own unit: derivatives are compared with others at the same state alone.
     return out.T
 
 
 def _slope_weights(at: Array) -> Array:
-    """Weights (k, n) of the derivative at 0, one of the places ``at`` (k, n), of the polynomial through values there."""
+    """Weights (k, n) of the derivative at 0, the middle one of the places ``at`` (k, n), of the polynomial through
+    values there."""
     count = at.shape[1]
     middle = count // 2
     out = np.zeros_like(at)
@@ -203,12 +205,9 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     around = np.clip(around, low[:, None], high[:, None])
     labels, joined = _labels(grid, around)
     state = grid.states[around]
-    over = grid.overburden[rows][:, None]
-    model = grid.model
-    f, _ = model.closures(np.exp(state[..., S_L]))
-    root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
-    log_q = np.log(model.slip(f) * root_t * over + state[..., S_G])
-    excess = state[..., S_Y] - model.base_flux(f)
+    quantities = grid.quantities(around)
+    f, _ = grid.model.closures(np.exp(state[..., S_L]))
+    excess = state[..., S_Y] - grid.model.base_flux(f)
     weights = np.zeros(around.shape)
     weights[:, 1], weights[:, 2] = 1.0 - share, share
     gaps = np.diff(labels, axis=1)
@@ -223,7 +222,7 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
         weights[even] = cubic[:, sound].T
         share = share.copy()
         share[even] = place[sound]
-    return (log_q * weights).sum(axis=1), (state[..., S_T] * weights).sum(axis=1), share
+    return (quantities[..., 0] * weights).sum(axis=1), (quantities[..., 3] * weights).sum(axis=1), share
 
 
 def lagrange(at: Array, x: Array) -> Array:

@@ -22,6 +22,7 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.roots import itp_trial
 
 #: The second largest component of the tangent may replace the largest, near a fold in that one, if it is at
 #: least this part of it (as in Pitcon).
@@ -527,10 +528,9 @@ def locate(
 ) -> Located[S]:
     """The point between two successive points of a trace where ``monitor(z, tangent, system)`` changes sign.
 
-    The bracket shrinks, by the ITP method (I. F. D. Oliveira and R. H. C. Takahashi 2020, ACM Trans. Math.
-    Softw. 47, 5), to ``tolerance`` in arclength or to round-off, whichever is wider. Each trial is corrected
-    in a hyperplane across the chord between the points until its corrections no longer shrink, so that its
-    tangent is exact to round-off too.
+    The bracket shrinks, by the ITP method (:func:`chuteflow.numerics.roots.itp_trial`), to ``tolerance`` in
+    arclength or to round-off, whichever is wider. Each trial is corrected in a hyperplane across the chord
+    between the points until its corrections no longer shrink, so that its tangent is exact to round-off too.
 
     Raises:
         InputError: if the points do not belong to the system or are not successive, or if the sign does not
@@ -563,7 +563,9 @@ def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float
             break
         if width > WIDE * start:
             slope = (right.value - left.value) / width
-        share = _itp(left, right, PUSH / start, fine * 2.0**remaining - 0.5 * width)
+        share = itp_trial(
+            (left.share, right.share), (left.value, right.value), PUSH / start, fine * 2.0**remaining - 0.5 * width
+        )
         trial = segment.trial(min(max(share, left.share + fine), right.share - fine))
         if isinstance(trial, Status):
             return _Bracket(left, right, slope, trial)
@@ -598,16 +600,6 @@ def _narrowed(left: _Trial[S], trial: _Trial[S], right: _Trial[S]) -> tuple[_Tri
     if trial.value == 0.0:
         return trial, trial
     return (trial, right) if trial.value * left.value > 0.0 else (left, trial)
-
-
-def _itp(left: _Trial[S], right: _Trial[S], push: float, radius: float) -> float:
-    """The next share to try: the secant's, pushed towards the middle, and within ``radius`` of it."""
-    width = right.share - left.share
-    middle = left.share + 0.5 * width
-    secant = left.share - left.value * width / (right.value - left.value)
-    inward = math.copysign(1.0, middle - secant)
-    distance = max(0.0, abs(middle - secant) - push * width * width)
-    return middle - inward * min(distance, max(radius, 0.0))
 
 
 class _Segment(Generic[S]):

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Field = NDArray[Any]
+from chuteflow.numerics.complex_step import derivative, stepped
 
-#: Imaginary step of the derivatives of functions: far below rounding, so that they are exact to rounding.
-_STEP = 1e-40
+Field = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +81,21 @@ def apply(function: Callable[[Field], Field], number: Any) -> list[Any]:
     if not isinstance(number, FirstOrder):
         return list(function(number))
     values = function(number.value)
-    slopes = np.imag(function(number.value + 1j * _STEP)) / _STEP
+    slopes = derivative(function(stepped(number.value)))
     return [FirstOrder(v, s[..., None] * number.slope) for v, s in zip(values, slopes, strict=True)]
+
+
+def apply_two(function: Callable[[Field, Field], Field], one: Any, other: Any) -> list[Any]:
+    """An analytic ``function`` of two numbers of one kind, each (m,), as k numbers: see :func:`apply`."""
+    if not isinstance(one, FirstOrder):
+        return list(function(one, other))
+    values = function(one.value, other.value)
+    by_one = derivative(function(stepped(one.value), other.value))
+    by_other = derivative(function(one.value, stepped(other.value)))
+    return [
+        FirstOrder(v, a[..., None] * one.slope + b[..., None] * other.slope)
+        for v, a, b in zip(values, by_one, by_other, strict=True)
+    ]
 
 
 def exp(number: Any) -> Any:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import Chute
+from chuteflow.branches.counting import flows_at_flux
 from chuteflow.branches.lines import NUMBERS, SteadyBranch, in_order, runs, smooth
 from chuteflow.paper.data import Table, chute_note, stacked
 from chuteflow.paper.sources import Source, SteadyCurve, reach
@@ -40,10 +41,8 @@ class Curves:
         return Table(self.title, tuple(notes), columns)
 
     def flows_at(self, name: Any, mass_flux: float) -> int:
-        """How many flows of a curve have this mass flux, counted between its points."""
-        return sum(
-            int(np.count_nonzero(np.diff(branch.mass_flux > mass_flux))) for branch in self.curves[name].branches
-        )
+        """How many flows of a curve have this mass flux."""
+        return flows_at_flux(self.curves[name].branches, mass_flux)
 
 
 def _columns(branch: SteadyBranch, number: int) -> dict[str, list[Any]]:

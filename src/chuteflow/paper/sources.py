@@ -1,7 +1,7 @@
 """Where the flows of the figures come from: the overburden method, or the paper's own mapped Chebyshev method.
 
 A figure asks its source for flows and curves, and knows nothing of the method. Newton's method needs a start: the
-mapped method begins each family from a flow of the other, solves it anew, and follows the family by itself.
+mapped method begins each family from a flow of the other, solves it again, and follows the family by itself.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Overburden:
         return [curve(chute, surface_temperature=surface_temperature, points=points) for chute in chutes]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Mapped:
     """The paper's method (section 3.4). Curves of several chutes are shared out to ``workers`` processes, and kept
     in memory: several figures ask for the same ones."""

@@ -53,11 +53,11 @@ def plot_wave_map(found: WaveMap) -> Figure:
 def plot_family_map(found: FamilyMap) -> Figure:
     """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
-    warmth = np.array([flow.surface_temperature for flow in found.flows])
-    place = np.linspace(0.0, 1.0, len(warmth))
+    temperature = np.array([flow.surface_temperature for flow in found.flows])
+    place = np.linspace(0.0, 1.0, len(temperature))
     _shaded(figure, left, found.depth_wavenumber, place, found.growth, found.unresolved)
     style.logarithmic(left, "x")
-    ticks = _round_places(place, warmth)
+    ticks = _round_places(place, temperature)
     left.set_yticks([*ticks], [*ticks.values()])
     left.set_ylim(0.0, 1.0)
     for i, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True)):
@@ -77,19 +77,19 @@ def plot_family_map(found: FamilyMap) -> Figure:
     return figure
 
 
-def _round_places(place: Any, warmth: Any) -> dict[float, str]:
+def _round_places(place: Any, temperature: Any) -> dict[float, str]:
     """Places along the family at which its surface temperature is a round number, and these numbers.
 
     Powers of ten come before others, which stand where there is room, the last ones only while there are few.
     """
     found: dict[float, str] = {}
-    decades = range(math.floor(math.log10(warmth.min())), math.ceil(math.log10(warmth.max())) + 1)
+    decades = range(math.floor(math.log10(temperature.min())), math.ceil(math.log10(temperature.max())) + 1)
     for digit in _DIGITS:
         if digit not in _ROUNDEST and len(found) >= _FEW:
             break
         for power in decades:
             value = digit * 10.0**power
-            above = np.log(warmth / value)
+            above = np.log(temperature / value)
             for i in np.flatnonzero((above[:-1] < 0.0) != (above[1:] < 0.0)):
                 share = above[i] / (above[i] - above[i + 1])
                 at = float(place[i] + share * (place[i + 1] - place[i]))

@@ -132,7 +132,7 @@ def parameters(chute: Chute, *left_out: str) -> str:
         if name not in left_out
     ]
     surface = {"free": "free surface", "interface": "interface"}[chute.surface]
-    return ", ".join([*numbers, surface, f"closure {chute.closure}"])
+    return ", ".join([*numbers, surface, chute.laws])
 
 
 def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:

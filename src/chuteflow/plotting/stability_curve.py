@@ -1,19 +1,15 @@
-"""A curve marked with its stability: picture, JSON objects and words."""
+"""A curve marked with its stability."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from chuteflow.io.contract import PLACE, factor
-from chuteflow.io.stability_records import mode_object
-from chuteflow.io.tables import number
+from chuteflow.io.stability_curve import LABELS
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import key_of_beyond, key_of_kinds, line, mark, parameters, shade_beyond
-from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, Run
-from chuteflow.steady.chute import Chute
-from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.stability.along import STABLE, UNKNOWN, MarkedCurve
+from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,14 +22,6 @@ _STROKES = {
     "oblique": style.Stroke(style.GREEN, style.DASHED),
     "uniform": style.Stroke(style.PURPLE, style.DASHED),
     UNKNOWN: style.Stroke(style.GREY, style.DOTTED),
-}
-_WORDS = {
-    STABLE: "stable",
-    "along": "unstable along the slope",
-    "across": "unstable across the slope",
-    "oblique": "unstable to oblique waves",
-    "uniform": "unstable as a whole",
-    UNKNOWN: "not known",
 }
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"))
 
@@ -70,56 +58,4 @@ def _key(marked: MarkedCurve) -> Iterator[Any]:
     seen = {run.label for branch in marked.branches for run in branch.runs}
     for label, stroke in _STROKES.items():
         if label in seen:
-            yield Line2D([], [], label=_WORDS[label], **stroke.line())
-
-
-def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
-    """The judged flows of each branch: their place, whether they are stable, and the mode that grows fastest.
-
-    Rates and wavenumbers are dimensionless; ``stable`` is null where it is not known.
-    """
-    return [
-        [
-            {
-                **_place(sample.flow, scales),
-                "stable": None if sample.found is None else sample.found.stable,
-                "mode": None if sample.found is None or sample.found.mode is None else mode_object(sample.found.mode),
-            }
-            for sample in branch.samples
-        ]
-        for branch in marked.branches
-    ]
-
-
-def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
-    """The changes of stability of each branch, with the error of T_surface, and whether they are neutral points."""
-    return [
-        [
-            {
-                **_place(change.flow, scales),
-                "error": change.error * factor("surface_temperature", change.flow.chute, scales),
-                "neutral": change.neutral,
-            }
-            for change in branch.changes
-        ]
-        for branch in marked.branches
-    ]
-
-
-def change_words(change: Change, chute: Chute, scales: Scales | None) -> str:
-    """Where stability changes, and how well that is known."""
-    warmth = factor("surface_temperature", chute, scales)
-    what = "neutral" if change.neutral else "the verdict changes"
-    T, error = change.flow.surface_temperature * warmth, change.error * warmth
-    return f"{what} at T_surface = {T:.6g} +- {error:.1g}"
-
-
-def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
-    return {NUMBERS[name].symbol: getattr(flow, name) * factor(name, flow.chute, scales) for name in PLACE}
-
-
-def stretch(run: Run, chute: Chute, scales: Scales | None) -> str:
-    """A stretch of a curve in words, by its surface temperatures."""
-    warmth = factor("surface_temperature", chute, scales)
-    ends = (number(flow.surface_temperature * warmth) for flow in (run.flows[0], run.flows[-1]))
-    return f"{_WORDS[run.label]} from T_surface = {' to '.join(ends)}"
+            yield Line2D([], [], label=LABELS[label], **stroke.line())

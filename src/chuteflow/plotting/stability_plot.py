@@ -9,9 +9,9 @@ import numpy as np
 
 from chuteflow.branches.results import FlowSet
 from chuteflow.io import words
-from chuteflow.io.stability_records import Answer
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
+from chuteflow.stability.answers import Answer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,7 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
 
 def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     """The energy budget of the leading mode of each flow: bars of the terms, that add up to the growth rate."""
-    from chuteflow.stability.budget import TERMS, energy_budget
+    from chuteflow.stability.budget import TERMS
 
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
@@ -65,7 +65,8 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     names = list(TERMS)
     places = np.arange(len(names), 0, -1)
     for ax, answer in zip(axes, drawn, strict=True):
-        budget = energy_budget(answer.modes[0])
+        budget = answer.budget
+        assert budget is not None  # as there are modes
         rates = np.array([[term.kinetic, term.density, term.thermal] for term in budget.terms])
         # Parts of one sign are put end to end, on their side of zero.
         for sign in (1.0, -1.0):

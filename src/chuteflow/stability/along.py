@@ -18,7 +18,7 @@ from chuteflow.checks import whole
 from chuteflow.errors import SolveError
 from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import smallest_rate
-from chuteflow.stability.neutral import EDGE, neutral_curves
+from chuteflow.stability.neutral import End, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, scanned
 from chuteflow.stability.verdict import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
@@ -210,8 +210,8 @@ def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
     extremes = []
     for curve in neutral_curves(plane, scanned(plane, _PLANE)):
         i = int(curve.z[:, 1].argmin())
-        ended = {0: curve.ends[0], len(curve.z) - 1: curve.ends[1]}.get(i, EDGE)
-        extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended == EDGE and curve.z[i, 1] > 0.0))
+        ended = {0: curve.ends[0], len(curve.z) - 1: curve.ends[1]}.get(i, End.EDGE)
+        extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended is End.EDGE and curve.z[i, 1] > 0.0))
     if not extremes or not min(extremes)[2]:
         return None
     share, error, _ = min(extremes)

@@ -27,7 +27,7 @@ from chuteflow.numerics.first_order import FirstOrder, exp
 from chuteflow.stability.base import Base
 from chuteflow.stability.linear import ACROSS, ALONG, DENSITY, HEAT, UP, grains
 from chuteflow.stability.modes import Mode, relative_fields
-from chuteflow.theory.transport import AXES, Fields, Grains, Motion, Vector, closures, motion
+from chuteflow.theory.transport import AXES, Fields, Grains, Motion, Vector, closures, motion, shear_rate
 from chuteflow.threads import on_one_thread
 
 #: Names of the terms, and what they are.
@@ -127,7 +127,9 @@ class _Disturbed:
         velocity = (numbers[ALONG], numbers[ACROSS], numbers[UP])
         moving = motion(Fields(numbers[DENSITY], velocity, numbers[HEAT]), gradient, law)
         T, root_T = exp(numbers[HEAT]), exp(0.5 * numbers[HEAT])
-        _, g1, g2, _, _, g5, _ = closures(law, exp(numbers[DENSITY]))
+        _, g1, g2, _, _, g5, _ = closures(
+            law, exp(numbers[DENSITY]), lambda: shear_rate(moving.shear) / (exp(numbers[DENSITY]) * root_T)
+        )
         loss = (g5 * root_T * T).value
         by_density = g5.slope[:, 0] * (root_T * T).value
         return cls(
@@ -197,7 +199,8 @@ class _Disturbed:
 def _stiffness(base: Base, law: Grains) -> Array:
     """nu dp/dnu at constant T."""
     nu, T = base.profile.volume_fraction, base.profile.granular_temperature
-    g1 = closures(law, FirstOrder(nu, np.ones((len(nu), 1))))[1]
+    nothing = FirstOrder(np.zeros(len(nu)), np.zeros((len(nu), 1)))
+    g1 = closures(law, FirstOrder(nu, np.ones((len(nu), 1))), lambda: nothing)[1]
     return nu * T * np.real(g1.slope[:, 0])
 
 

@@ -29,11 +29,13 @@ from numpy.typing import NDArray
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.numerics.legendre import LobattoGrid, lobatto
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
 from chuteflow.theory.transport import Grains, Vector, traction
 
@@ -42,8 +44,6 @@ DEGREE = 40
 FIELDS = 4
 #: Share of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
-#: Imaginary step of derivatives, far below rounding.
-_STEP = 1e-40
 #: Densities far above the base fall off to zero.
 _vanishing = np.errstate(under="ignore")
 
@@ -121,6 +121,7 @@ class Layer:
             raise InputError(
                 "the interface is known for steady flows alone: time needs the free surface, give --surface free"
             )
+        require_richman(flow.chute.base, "disturbed flows are")
         Grains(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
         return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
@@ -171,8 +172,7 @@ class Layer:
     @_vanishing
     def jacobian(self, state: Array) -> Array:
         """d rate/d state, exact (complex steps)."""
-        stepped: Any = state + _STEP * 1j * np.eye(len(state))
-        return self.rate(stepped).imag.T / _STEP
+        return derivative(self.rate(stepped(state, np.eye(len(state))))).T
 
     def growth_rates(self, state: Array) -> NDArray[np.complex128]:
         """Growth rates of small disturbances of a steady ``state``, fastest growing first; the mass is given.
@@ -227,8 +227,10 @@ class Layer:
         m = self.mass
         tau, T, root_T = np.exp(log_tau), np.exp(log_T), np.exp(0.5 * log_T)
         nu = m / tau
-        g = self._coefficients(nu)
         u_m, w_m, T_m = self._slope(u), self._slope(w), T * self._slope(log_T)
+        # sqrt(2 D : D)/(nu sqrt(T)), with d/dz = -nu d/dm
+        rate = np.sqrt(u_m**2 + 4.0 / 3.0 * w_m**2) / root_T
+        g = self._coefficients(nu, rate)
         nu_m = (1.0 - m * self._slope(log_tau)) / tau
         normal = m * g.compressibility * T / tau + (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * root_T * nu * w_m
         base = self._at_base(nu[..., -1], u[..., -1], -(nu * w_m)[..., -1], T[..., -1], normal[..., -1])
@@ -244,8 +246,13 @@ class Layer:
             base_loss=base[2],
         )
 
-    def _coefficients(self, nu: Array) -> Coefficients:
+    def _coefficients(self, nu: Array, rate: Array | None = None) -> Coefficients:
+        """The coefficients of the law where the shear rate over nu sqrt(T) is ``rate``; without one, those that do
+        not depend on it."""
         room = 1.0 - nu / self.law.densest
+        if rate is not None and self.law.knows_slope:
+            at_shear: Any = self.law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
+            return at_shear(nu, room, self.chute.restitution, rate)
         return self.law.coefficients(nu, room, self.chute.restitution, self.chute.slope)
 
     def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:

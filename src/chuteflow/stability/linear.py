@@ -35,6 +35,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import Base
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Coefficients
 from chuteflow.theory.transport import Fields, Grains, Motion, Vector, base_conditions, motion
 
@@ -132,6 +133,7 @@ def grains(base: Base) -> Grains:
             f"stability with the surface {chute.surface!r}: its conditions are known for a steady, level interface "
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
+    require_richman(chute.base, "disturbed flows are")
     return Grains(base.flow.law, chute.restitution, chute.slope)
 
 

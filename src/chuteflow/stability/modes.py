@@ -268,12 +268,12 @@ class Disturbances:
 
     def _resolutions(self, kx: float, ky: float, level: int) -> tuple[Resolution, Resolution]:
         # Far above, where nu is below k, stresses change from those of inertia to those of viscosity.
-        k, warmth, mass = float(np.hypot(kx, ky)), self.flow.surface_temperature, self.flow.mass_holdup
+        k, temperature, mass = float(np.hypot(kx, ky)), self.flow.surface_temperature, self.flow.mass_holdup
         beyond = np.log(max(1.0, _SHORT * mass / (k * self.flow.centre_of_mass))) if k else 0.0
         farther = _STRIDE * float(np.ceil(beyond / _STRIDE))
         # In powers of 2, so that wavenumbers share grids.
-        decay = min(2.0 ** float(np.round(np.log2(k * warmth))), _LARGEST_WEIGHT) if k * warmth > 0.7 else 0.0
-        stretch = float(np.log1p(mass / warmth)) + decay
+        decay = min(2.0 ** float(np.round(np.log2(k * temperature))), _LARGEST_WEIGHT) if k * temperature > 0.7 else 0.0
+        stretch = float(np.log1p(mass / temperature)) + decay
         coarse, fine = (
             Resolution(round(degree * (1.0 + 0.5 * farther / reach)), reach + farther, weight * stretch)
             for degree, reach, weight in zip(DEGREES[level], _REACH[level], _WEIGHTS, strict=True)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -131,7 +132,7 @@ def _entered(
         onward, end = _side(plane, (begin, sigma), line[i], along, control)
         if len(onward) < 2:
             continue
-        if end == _CLOSED:
+        if end is End.CLOSED:
             return _curve([*onward, onward[0]], (end, end))
         back, start = _side(plane, (begin, sigma), line[i], -along, control)
         return _curve([*back[:0:-1], *onward], (start, end))
@@ -164,9 +165,13 @@ def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
     )
 
 
-_CLOSED = "its own beginning: it is closed"
-#: Why a curve ends that leaves the plane.
-EDGE = "the edge of the range"
+class End(StrEnum):
+    """Where a neutral curve ends, as is said of it; one that is lost names the reason beside LOST."""
+
+    EDGE = "the edge of the range"
+    CLOSED = "its own beginning: it is closed"
+    CONTINUOUS = "where the mode runs into the continuous spectrum"
+    LOST = "a point from which it could not be followed"
 
 
 def _side(
@@ -182,15 +187,15 @@ def _side(
         if edge is not None:
             if out:
                 out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
-            return out, EDGE
+            return out, End.EDGE
         judged = system.judged(point.z)
         if judged.error > _ASTRAY:
-            return out, "where the mode runs into the continuous spectrum"
+            return out, End.CONTINUOUS
         points.append(point)
         out.append(judged)
         if len(points) > 3 and closes(points[0], points[-2], points[-1]):
-            return out[:-1], _CLOSED
-    return out, f"a point from which it could not be followed ({path.status.name.lower().replace('_', ' ')})"
+            return out[:-1], End.CLOSED
+    return out, f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})"
 
 
 def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:

@@ -1,13 +1,14 @@
-"""The fastest wave of a flow: a scan of all wavenumbers and directions, and climbs from its peaks.
+"""The fastest wave of a flow: a scan of all wavenumbers and directions, and ascents from its peaks.
 
 # notation: k = |(kx, ky)| wavenumber, a angle of the wave to the slope (0 along, pi/2 across), sigma eigenvalue.
 
 Growth rates are even in kx and in ky, so that a quarter of the plane of wavenumbers holds all. It is scanned at
 points even in ln k, and at angles that are closer near pi/2, where ridges are narrow. From each local maximum of the
 leading eigenvalue and of the second one, whatever its sign, the rate is followed uphill with its exact derivatives
-in ln k and a. Waves along and across the slope are stationary in a by symmetry, so that a climb there looks aside too.
+in ln k and a. Waves along and across the slope are stationary in a by symmetry, so that an ascent from there looks
+aside too.
 
-The scan is made on a coarse grid. The summits are computed as modes, on as many grids as it takes, and so is every
+The scan is made on a coarse grid. The maxima are computed as modes, on as many grids as it takes, and so is every
 point of the scan where something seems to grow faster than the best of them: it is faster, or an artefact of the
 coarse grid, or remains unresolved, which is told.
 """
@@ -36,20 +37,20 @@ from chuteflow.stability.modes import (
 
 #: Points of the scan: wavenumbers, and angles in degrees.
 SCAN, ANGLES = 14, (0.0, 15.0, 30.0, 60.0, 75.0, 82.5, 86.25, 90.0)
-#: Eigenvalues that are kept at each point, and climbs at most.
+#: Eigenvalues that are kept at each point, and ascents at most.
 _SHEETS, _CLIMBS = 2, 16
 #: Longest step in ln k and a in which a mode is followed.
 _STEP = 0.15
 #: Shortest step after which the mode is given up, and the likeness of its vectors from one to the next.
 _SHORTEST, _LIKENESS = 5e-3, 0.5
-#: A unit of the climber is this angle: ridges are narrow in it.
+#: A unit of an ascent is this angle: ridges are narrow in it.
 _UNIT = 0.25
-#: Slopes at which climbs end, over their rates; and evaluations of a climb.
+#: Slopes at which ascents end, over their rates; and evaluations of an ascent.
 _ROUGH, _EXACT = 1e-4, 1e-7
 _EVALUATIONS = 30
 #: Angles aside of a wave along or across at which it is seen whether it is a maximum; below the last it is one.
 _ASIDE, _ALIGNED = np.radians((1.5, 4.0)), np.radians(0.2)
-#: Summits are one if they are this near in ln k and a, and a climb that gains more than this share is gone on with.
+#: Maxima are one if they are this near in ln k and a, and an ascent that gains more than this share is gone on with.
 _SAME, _GAIN, _ANEW = 0.05, 1e-4, 3
 #: Unresolved points after which further ones are not tried: each costs the finest grids.
 _MOST_UNRESOLVED = 12
@@ -81,7 +82,7 @@ class _Place:
         return float(np.hypot(self.log_k - log_k, self.angle - angle))
 
     def is_same(self, other: _Place) -> bool:
-        """Whether both are one summit."""
+        """Whether both are one maximum."""
         near = self.distance(other.log_k, other.angle) < _SAME
         return near and abs(self.sigma - other.sigma) < _SAME * abs(self.sigma)
 
@@ -117,13 +118,13 @@ class _Search:
         self.unresolved: list[tuple[float, float]] = []
 
     def run(self) -> Fastest:
-        """Scan, climb, and settle what seems to grow faster than the best summit."""
+        """Scan, ascend, and settle what seems to grow faster than the best maximum."""
         logs = np.linspace(*self.bounds, SCAN)
         angles = np.radians(ANGLES) if self.free else np.zeros(1)
         sheets = self._scanned(logs, angles)
         if self.free:
             self._take_uniform()
-        self._take_best(self._summits(_starts(logs, angles, sheets)))
+        self._take_best(self._maxima(_starts(logs, angles, sheets)))
         self._settle(logs, angles, np.real(sheets[0]))
         if self.best is None or self.best.growth < 0.0:
             self._take_longest()
@@ -178,30 +179,30 @@ class _Search:
         if mode is not None and (self.best is None or mode.growth > self.best.growth):
             self.best = mode
 
-    def _summits(self, starts: list[_Place]) -> list[_Place]:
-        """Where the climbs end, highest first, each once."""
+    def _maxima(self, starts: list[_Place]) -> list[_Place]:
+        """Where the ascents end, highest first, each once."""
         out: list[_Place] = []
         ends = chain.from_iterable(map(self._ascended, starts))
-        for summit in sorted(ends, key=lambda place: -place.sigma.real):
-            if not any(summit.is_same(other) for other in out):
-                out.append(summit)
+        for maximum in sorted(ends, key=lambda place: -place.sigma.real):
+            if not any(maximum.is_same(other) for other in out):
+                out.append(maximum)
         return out
 
-    def _take_best(self, summits: list[_Place]) -> None:
-        """The best of the summits, which are certified from the highest down until one is a mode."""
-        for summit in summits:
-            if self.best is not None and summit.sigma.real <= self.best.growth:
+    def _take_best(self, maxima: list[_Place]) -> None:
+        """The best of the maxima, which are certified from the highest down until one is a mode."""
+        for maximum in maxima:
+            if self.best is not None and maximum.sigma.real <= self.best.growth:
                 return
-            self._certify(summit)
+            self._certify(maximum)
 
-    def _certify(self, summit: _Place) -> None:
-        """Take the leading mode at a summit; where another one leads there, climb on by that."""
+    def _certify(self, maximum: _Place) -> None:
+        """Take the leading mode at a maximum; where another one leads there, go on by that."""
         for _ in range(_ANEW):
-            mode = self._known(summit)
+            mode = self._known(maximum)
             self._take(mode)
-            if mode is None or mode.growth < summit.sigma.real + _GAIN * abs(summit.sigma.real):
+            if mode is None or mode.growth < maximum.sigma.real + _GAIN * abs(maximum.sigma.real):
                 return
-            summit = self._ascended(_Place(summit.log_k, summit.angle, mode.sigma))[-1]
+            maximum = self._ascended(_Place(maximum.log_k, maximum.angle, mode.sigma))[-1]
 
     def _known(self, place: _Place) -> Mode | None:
         """The leading mode at a place; where that is not told, the one of the place, if it is a mode."""
@@ -232,8 +233,8 @@ class _Search:
                 self.unresolved.append(wave)
                 continue
             if found and (self.best is None or found[0].growth > self.best.growth):
-                for summit in self._ascended(_Place(float(logs[i]), float(angles[j]), found[0].sigma)):
-                    self._certify(summit)
+                for maximum in self._ascended(_Place(float(logs[i]), float(angles[j]), found[0].sigma)):
+                    self._certify(maximum)
 
     def _polish(self) -> None:
         """Climb once more to rounding, on the grid that the best mode was computed on."""
@@ -245,23 +246,23 @@ class _Search:
             k, angle = mode.ky if self.fixed[1] is None else mode.kx, 0.0
         start = _Place(float(np.log(k)), angle, mode.sigma)
         turning = self.free and min(angle, 0.5 * np.pi - angle) > _ALIGNED
-        summit = _Climb(self, start, mode.operator).summit(start, turning=turning, accuracy=_EXACT)
-        polished = self._known(summit)
-        # Near the summit rates differ by less than their errors: the summit is where the slope vanishes.
+        maximum = _Ascent(self, start, mode.operator).maximum(start, turning=turning, accuracy=_EXACT)
+        polished = self._known(maximum)
+        # Near the maximum rates differ by less than their errors: the maximum is where the slope vanishes.
         if polished is not None and polished.growth > mode.growth - max(mode.error, polished.error):
             self.best = polished
 
     def _ascended(self, start: _Place) -> list[_Place]:
-        """The summits that a mode leads to: from an axis that along it, and one aside if it is higher there."""
-        climb = _Climb(self, start)
+        """The maxima that a mode leads to: from an axis that along it, and one aside if it is higher there."""
+        ascent = _Ascent(self, start)
         if not self.free or min(start.angle, 0.5 * np.pi - start.angle) > _ALIGNED:
-            return [climb.summit(start, turning=self.free)]
-        ridge = climb.summit(start, turning=False)
+            return [ascent.maximum(start, turning=self.free)]
+        ridge = ascent.maximum(start, turning=False)
         sign = 1.0 if ridge.angle < 0.25 * np.pi else -1.0
         for aside in _ASIDE:
-            beside = climb.at(ridge.log_k, ridge.angle + sign * float(aside))
+            beside = ascent.at(ridge.log_k, ridge.angle + sign * float(aside))
             if beside is not None and beside.sigma.real > ridge.sigma.real:
-                return [ridge, climb.summit(beside, turning=True)]
+                return [ridge, ascent.maximum(beside, turning=True)]
         return [ridge]
 
 
@@ -269,7 +270,7 @@ class _LostError(Exception):
     """A mode could not be followed."""
 
 
-class _Climb:
+class _Ascent:
     """The rate of one mode as a function of ln k and the angle, on one grid, followed in small steps."""
 
     def __init__(self, search: _Search, start: _Place, of: Operator | None = None) -> None:
@@ -308,7 +309,7 @@ class _Climb:
         by_k = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
         return _Place(log_k, angle, pair.value, pair, self.search.directions(kx, ky) @ by_k)
 
-    def summit(self, start: _Place, *, turning: bool, accuracy: float = _ROUGH) -> _Place:
+    def maximum(self, start: _Place, *, turning: bool, accuracy: float = _ROUGH) -> _Place:
         """The local maximum of the rate uphill from ``start``, at its angle unless ``turning``.
 
         Its slope, over the rate at the start, is below ``accuracy``.

@@ -52,7 +52,7 @@ class Stability:
     (kx, ky) at which the grids do not tell. If wavenumbers were given, ``stable`` is None and ``grows`` says what
     the wave does. The mass mode at k = 0, which leads to the neighbouring steady flow, is set apart. ``mode`` is None
     where the continuous spectrum, which decays, hides all modes, and where nothing is told. ``examined`` counts the
-    wavenumbers of the scan, whose peaks are climbed.
+    wavenumbers of the scan, from whose peaks the maxima are sought.
     """
 
     flow: Flow

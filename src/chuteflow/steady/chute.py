@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.parameters import PARAMETERS
-from chuteflow.theory.constitutive import require_positive
+from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.theory.constitutive import Law, require_positive
 from chuteflow.theory.laws import law
 
 #: Surface conditions: the half-line (2.16), or the interface of Jenkins & Hanes (3.31)-(3.32).
@@ -26,7 +27,10 @@ class Chute:
         wall_restitution: e_w of a grain and the base, 0 <= e_w <= 1.
         roughness: r of (2.8), 1/2 <= r <= sqrt(3)/2.
         surface: "free" or "interface".
-        closure: name of a constitutive law, see :data:`chuteflow.theory.laws.LAWS`.
+        closure: the constitutive law: its name, a text such as "extended:packing=0.64" or "grains.py:OWN" (see
+            :mod:`chuteflow.theory.laws`), or a :class:`chuteflow.theory.constitutive.Law`.
+        base: the condition at the base, see :mod:`chuteflow.theory.bases`: its name, with parameters as in
+            "richman:diameter=1.5", or a :class:`chuteflow.theory.bases.Base`.
 
     Raises:
         InputError: for a value out of range, naming it, what was given and what is allowed.
@@ -37,14 +41,17 @@ class Chute:
     wall_restitution: float
     roughness: float
     surface: str = "free"
-    closure: str = "lun"
+    closure: str | Law = "lun"
+    base: str | Base = "richman"
 
     def __post_init__(self) -> None:
         for name, parameter in PARAMETERS.items():
-            object.__setattr__(self, name, parameter.checked(getattr(self, name)))
+            check = base(self.base).checked_roughness if name == "roughness" else parameter.checked
+            object.__setattr__(self, name, check(getattr(self, name)))
         if self.surface not in SURFACES:
             raise InputError(f"unknown surface {self.surface!r}: choose one of {', '.join(SURFACES)}")
-        require_positive(law(self.closure), self.restitution, self.slope)
+        if self.law.known:
+            require_positive(self.law, self.restitution, self.slope)
 
     @classmethod
     def at_angle(cls, degrees: float, **others: Any) -> Chute:
@@ -63,6 +70,24 @@ class Chute:
         """Inclination theta in degrees."""
         return math.degrees(math.atan(self.slope))
 
+    @property
+    def law(self) -> Law:
+        """The constitutive law that its closure means now."""
+        return law(self.closure)
+
+    @property
+    def laws(self) -> str:
+        """Closure and base in words; the base of the paper goes without saying."""
+        on = base(self.base)
+        return f"closure {self.closure}" + ("" if on == BASES["richman"] else f", base {on}")
+
     def as_dict(self) -> dict[str, float | str]:
-        """All parameters by name."""
-        return asdict(self)
+        """All parameters by name, the closure as a text."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        values["closure"] = str(self.closure)
+        on = base(self.base)
+        # The base of the paper goes without saying.
+        if on == BASES["richman"]:
+            del values["base"]
+            return values
+        return values | {"base": str(on)}

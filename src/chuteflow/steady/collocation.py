@@ -24,6 +24,8 @@ from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, W
 LOG_Q, LOG_H, LOG_M, LOG_T = range(4)
 #: The least stretch: plain to rounding, and in need of no other formula.
 _PLAIN = 1e-9
+#: The least density argument of a logarithm.
+_LEAST = 1e-300
 
 
 def stretch_map(s: Array, stretch: Array | float) -> tuple[Array, Array]:
@@ -104,15 +106,15 @@ class State:
         self.p = p = self.overburden + model.surface_stress
         #: P/p, which is 1 on the half-line
         self.laden = self.overburden / p if model.surface_stress else np.ones_like(p)
-        self.x = p * np.exp(-self.theta)
+        self.x = model.density_argument(p, self.theta)
         self.f, self.df = f, _ = model.closures(self.x)
         self.y = f[CONDUCTION] * self.g / mass
         self.s_p = 1.0 / (mass * dm)  # ds/dp
         self.y_p = (self.y @ problem.grid.derivative.T) * self.s_p
-        self.rise = p * self.g / mass  # p dtheta/dp
+        self.rise = p * self.g / mass - model.beta  # p dtheta/dp, less beta
         self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
         self.net_loss = f[LOSS] - model.slope**2 * f[WORK]
-        self.log_t = self.theta + f[GAMMA]
+        self.log_t = model.log_temperature(p, self.theta, f[GAMMA])
         self.base_flux = model.base_flux(f[..., -1])
         #: complex where any unknown or parameter is
         self.dtype = np.result_type(self.y, self.base_flux)
@@ -130,6 +132,8 @@ class State:
         """Derivative (n+2, n+3) of the residual with respect to z."""
         problem, model = self.problem, self.problem.model
         f, df, p, y, laden = self.f, self.df, self.p, self.y, self.laden
+        # d ln x / d ln M
+        raised = (1.0 + model.beta) * laden
         n = p.shape[-1]
         nodes = np.arange(n)
         y_log_x = df[CONDUCTION] * self.g / self.mass
@@ -139,7 +143,7 @@ class State:
         np.multiply(-y_log_x[..., None], problem.accumulate, out=y_z[..., :n])
         y_z[..., nodes, nodes] += f[CONDUCTION] / self.mass
         y_z[..., n] = -y_log_x
-        y_z[..., n + 1] = y_log_x * laden - y
+        y_z[..., n + 1] = y_log_x * raised - y
         heating_log_x = df[COUPLING] * (1.0 - self.rise)
         by_log_x = 0.5 * y * heating_log_x - p * (df[LOSS] - model.slope**2 * df[WORK])
         by_rise = 0.5 * y * (1.0 - f[COUPLING])
@@ -153,27 +157,36 @@ class State:
         body[..., n + 1] += (
             (self.overburden - p) * self.y_p
             - self.overburden * self.net_loss
-            + by_log_x * laden
-            + by_rise * (laden - 1.0) * self.rise
+            + by_log_x * raised
+            + by_rise * (laden - 1.0) * (self.rise + model.beta)
         )
         out[..., 0, :] = y_z[..., 0, :]
-        base = model.slope * model.slip_slope(df[..., -1])
+        base = model.base_flux_slope(df[..., -1])
         out[..., -1, :] = y_z[..., -1, :]
         out[..., -1, :n] += base[..., None] * problem.accumulate[..., -1, :]
         out[..., -1, n] += base
-        out[..., -1, n + 1] -= base * laden[..., -1]
+        out[..., -1, n + 1] -= base * raised[..., -1]
         return out
 
     def macroscopic(self) -> Array:
         """ln Q, ln h, ln M and ln T_surface, (4,): (3.26) and (3.27) as integrals over the overburden."""
         mass = self.mass[..., 0]
         flux, moment = self._slip + self._glide.sum(axis=-1), self._heights.sum(axis=-1)
-        return np.stack([np.log(flux), np.log(moment / mass), np.log(mass), self.log_t[..., 0]], axis=-1)
+        return np.stack([np.log(flux), np.log(moment / mass), np.log(mass), self.surface], axis=-1)
+
+    @property
+    def surface(self) -> Array:
+        """ln T_surface; theta there where T has no limit far above."""
+        return (self.theta if self.problem.model.unlimited else self.log_t)[..., 0]
 
     @cached_property
     def _heights(self) -> Array:
         """Contributions of the nodes to the integral of P dz = (P/nu) dp."""
-        lever = self.laden * np.exp(self.theta - self.f[DENSITY])
+        model = self.problem.model
+        if model.beta == 0.0:
+            lever = self.laden * np.exp(self.theta - self.f[DENSITY])
+        else:
+            lever = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
         return self.problem.grid.weights * self.problem.share[1] * self.mass * lever
 
     @cached_property
@@ -210,10 +223,13 @@ class State:
         out = np.zeros((*self.p.shape[:-1], 4, n + 2), dtype=self.dtype)
         out[..., :2, :n] = by_theta @ self.problem.accumulate
         out[..., :2, n] = by_theta.sum(axis=-1)
-        glide_move = (glide * (2.0 + 0.5 * df[GAMMA] * laden) + work_part * laden).sum(axis=-1)
-        slip_move = 1.0 + (slip_log_x + 0.5 * df[GAMMA][..., -1]) * laden[..., -1]
+        raised = (1.0 + model.beta) * laden
+        warmed = df[GAMMA] * raised - model.beta * laden  # d ln T / d ln M
+        glide_move = (glide * (2.0 + 0.5 * warmed) + work_part * raised).sum(axis=-1)
+        by_share = slip_log_x * (1.0 + model.beta) + 0.5 * (df[GAMMA][..., -1] * (1.0 + model.beta) - model.beta)
+        slip_move = 1.0 + by_share * laden[..., -1]
         out[..., LOG_Q, n + 1] = glide_move / flux + end * slip_move
-        height_move = (heights * (2.0 - laden * (1.0 + df[DENSITY]))).sum(axis=-1)
+        height_move = (heights * (2.0 - raised * (1.0 + df[DENSITY]))).sum(axis=-1)
         out[..., LOG_H, n + 1] = height_move / moment - 1.0
         out[..., LOG_M, n + 1] = 1.0
         out[..., LOG_T, n] = self.log_t_slope

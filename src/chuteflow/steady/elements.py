@@ -28,6 +28,10 @@ DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, 400)
 _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
+#: Ends of elements in the first one, in parts of it, where T has no limit at the surface.
+_GRADED = 0.5 ** np.arange(48, 0, -1.0)
+#: A piece of a grid is not shorter than this.
+_APART = 1e-6
 #: Elements at most, and pieces of a grid.
 MOST_ELEMENTS = 768
 MOST_PIECES = MOST_ELEMENTS // _PER_PIECE + 1
@@ -46,6 +50,11 @@ def _gauss() -> tuple[Array, Array, Array, Array]:
 
 
 _GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()
+
+
+def _graded(breaks: Array) -> Array:
+    """``breaks`` and more of them towards the surface, where P dz has an integrable singularity if T has no limit."""
+    return np.concatenate([breaks[:1], breaks[1] * _GRADED, breaks[1:]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +81,13 @@ class Elements:
         breaks = kernel.distribute(
             s, rough[:, 0] / _CHANGE, rough[:, 1], 1.0 / (_CHANGE_OF_FLUX * model.flux_scale), _LONGEST
         )
+        if model.unlimited:
+            breaks = _graded(breaks)
         nodal = np.ascontiguousarray(values(kernel.places(breaks, _GAUSS[0])))
+        return cls._through(model, stretch, log_mass, breaks, nodal)
+
+    @classmethod
+    def _through(cls, model: Model, stretch: float, log_mass: float, breaks: Array, nodal: Array) -> Elements:
         ends, slopes = np.empty((len(breaks), 2)), np.empty((len(breaks) - 1, STAGES, 2))
         kernel.fit(breaks, nodal, _DIFFERENCES, ends, slopes)
         return cls(model, stretch, breaks, ends, slopes, log_mass)
@@ -91,18 +106,24 @@ class Elements:
             lambda s: interpolation_matrix(problem.grid, s) @ theta_and_y,
         )
 
-    def grids(self) -> Iterator[tuple[Collocation, Array]]:
+    def grids(self, pins: Array) -> Iterator[tuple[Collocation, Array]]:
         """The problem on Chebyshev grids that may resolve the flow, from coarse to fine, and its unknowns there to
         about 1e-8: between the ends of the elements the polynomials have no more digits.
 
-        Last comes one with a grid on each of some pieces.
+        Last comes one with a grid on each of some pieces, and that alone where there are ``pins``: places at which
+        pieces have to end, since the flow passes a break of the law there.
         """
-        for degree in DEGREES:
+        for degree in () if pins.size or self.model.unlimited else DEGREES:
             problem = Collocation(self.model, degree, self.stretch)
             z, y = self._unknowns(problem)
             if tail(problem.grid, np.stack([z[:-2] / np.abs(z[:-2]).max(), y / np.abs(y).max()]) + 1e-30) < _ROUGHLY:
                 yield problem, z
         inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
+        if self.model.unlimited:
+            inner = np.concatenate([self.breaks[1] * 2.0 ** np.arange(0, 40, 4), inner])
+            inner = np.unique(inner[inner < 0.9])
+        if pins.size:
+            inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
         yield problem, self._unknowns(problem)[0]
 
@@ -111,7 +132,7 @@ class Elements:
         theta, y = self.at(problem.grid.nodes).T
         mass = np.exp(self.log_mass)
         p = mass * problem.share[0] + self.model.surface_stress
-        f, _ = self.model.closures(p * np.exp(-theta))
+        f, _ = self.model.closures(self.model.density_argument(p, theta))
         return np.concatenate([mass * y / f[CONDUCTION], [theta[0], self.log_mass]]), y
 
     def at(self, s: Array) -> Array:
@@ -121,7 +142,7 @@ class Elements:
         return out
 
     def adapted(self, stretch: float) -> Elements:
-        """The same flow on elements chosen anew, with another stretch."""
+        """The same flow on new elements, with another stretch."""
         return self.blended(self, 0.0, stretch)
 
     def blended(self, other: Elements, fraction: float, stretch: float) -> Elements:
@@ -132,12 +153,25 @@ class Elements:
             1.0 / (_CHANGE_OF_FLUX * self.model.flux_scale), _LONGEST,
         )  # fmt: skip
         log_mass = self.log_mass + fraction * (other.log_mass - self.log_mass)
-        return Elements(self.model, stretch, breaks, ends, slopes, log_mass)
+        found = Elements(self.model, stretch, breaks, ends, slopes, log_mass)
+        return found.on(_graded(breaks)) if self.model.unlimited else found
+
+    @property
+    def inner_places(self) -> Array:
+        """The ends of the grid, and the Gauss points of all elements between them, ascending."""
+        s = kernel.places(self.breaks, _GAUSS[0])
+        inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
+        return np.concatenate([s[:1], inner, s[-1:]])
+
+    def on(self, breaks: Array) -> Elements:
+        """The polynomials through values of the flow on other elements."""
+        values = self.at(kernel.places(breaks, _GAUSS[0]))
+        return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
 
     def halved(self) -> Elements:
         """The same polynomials on elements of half the length."""
-        halves = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
-        return Elements(self.model, self.stretch, *halves, self.log_mass)
+        breaks, ends, slopes = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
+        return Elements(self.model, self.stretch, breaks, ends, slopes, self.log_mass)
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
@@ -146,7 +180,7 @@ class Elements:
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
         errors = np.zeros((2 if rounding else 0, 4))
         mu, step = kernel.iterate(
-            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
             ends, slopes, self.log_mass, weights, value, tolerance, most, quantities, rates,
             errors,
         )  # fmt: skip
@@ -159,7 +193,7 @@ class Elements:
         (4,), change by 1; None where the condition turns."""
         change = np.empty(4)
         found = kernel.direction(
-            self.model.table.coefficients, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
             self.ends, self.slopes, self.log_mass, weights, change,
         )  # fmt: skip
         return change if found else None

@@ -13,15 +13,16 @@ from chuteflow import display
 from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
+from chuteflow.numerics.roots import secants
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
+from chuteflow.steady.kinds import density_kind, interior_kind
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.names import name_of
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
-from chuteflow.theory.laws import law
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
@@ -106,7 +107,8 @@ class Flow:
 
     def __repr__(self) -> str:
         numbers = {NUMBERS[name].symbol: getattr(self, name) for name in PLACE}
-        return display.line("Flow", self.name, **numbers, error=self.error)
+        said = self.name if self.law.known else f"closure {self.law} not registered here"
+        return display.line("Flow", said, **numbers, error=self.error)
 
     def _repr_html_(self) -> str:
         rows = [(q.symbol, display.number(getattr(self, name)), q.description) for name, q in NUMBERS.items()]
@@ -142,7 +144,8 @@ class Flow:
     @property
     def law(self) -> Law:
         """The constitutive law that it was solved with, whatever is registered under its name now."""
-        return self._model.law
+        source = self.solution.source
+        return source if isinstance(source, Law) else self._model.law
 
     @property
     def error(self) -> float:
@@ -197,15 +200,12 @@ class Flow:
         """ "dissipative" or "productive" throughout, or "mixed"."""
         net = self._samples["net"]
         # Net loss within rounding of zero decides nothing.
-        scale = 1e-12 * np.abs(net).max()
-        if net.min() >= -scale:
-            return "dissipative"
-        return "productive" if net.max() <= scale else "mixed"
+        return interior_kind(net.min(), net.max(), 1e-12 * np.abs(net).max())
 
     @property
     def density(self) -> str:
         """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
-        return "inverted" if self.density_excess > 0.0 else "monotonic"
+        return density_kind(self.density_excess)
 
     @cached_property
     def density_excess(self) -> float:
@@ -222,7 +222,7 @@ class Flow:
     def validity(self) -> Validity:
         """How far the flow keeps to what the theory takes for granted."""
         problem, state = self.solution.problem, self._state
-        chosen = law(self.chute.closure)
+        chosen = self.law
         nu = _density(state.x, state.f)
         # Rounding does not let grains be packed to the last.
         room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
@@ -235,6 +235,7 @@ class Flow:
             slip_ratio=float(self._model.slip(state.f[:, -1])),
             knudsen_number=MEAN_FREE_PATH / float(per_grain @ contacts) / self.centre_of_mass,
             density_turns=self._density_turns,
+            dense_limit=chosen.dense_limit,
         )
 
     @property
@@ -308,15 +309,15 @@ class Flow:
         g = matrix @ state.g
         theta = matrix @ state.theta
         p = state.mass * share + self._model.surface_stress
-        x = p * np.exp(-theta)
+        x = self._model.density_argument(p, theta)
         f, _ = self._model.closures(x)
-        rise = p * g / state.mass
+        rise = p * g / state.mass - self._model.beta
         fields = {
             "p": p,
             "nu": _density(x, f),
             "y": f[CONDUCTION] * g / state.mass,
             "rise": rise,
-            "log_t": theta + f[GAMMA],
+            "log_t": self._model.log_temperature(p, theta, f[GAMMA]),
         }
         return fields, f
 
@@ -340,21 +341,13 @@ class Flow:
         k = int(np.argmax(nu))
         if k in (0, len(nu) - 1):
             return share[k : k + 1]
-        low, high = share[k - 1], share[k + 1]
         below, above = (float(self._samples["rise"][i] - 1.0) for i in (k - 1, k + 1))
-        middle = share[k]
-        # Secants within the bracket; an end that stays counts for half (the Illinois method).
-        for _ in range(50):
-            value = float(self._at_share(np.array([middle]))[0]["rise"][0] - 1.0)
-            if value < 0.0:
-                low, below, above = middle, value, 0.5 * above
-            else:
-                high, below, above = middle, 0.5 * below, value
-            # The density is flat there: half the digits of the place are all of its own.
-            if abs(value) < _LEVEL or not below < 0.0 < above:
-                break
-            middle = low - below * (high - low) / (above - below)
-        return np.array([middle])
+
+        def rise(at: float) -> float:
+            return float(self._at_share(np.array([at]))[0]["rise"][0] - 1.0)
+
+        # The density is flat there: half the digits of the place are all of its own.
+        return np.array([secants(rise, (share[k - 1], share[k + 1]), (below, above), share[k], _LEVEL)])
 
     @cached_property
     def _antiderivatives(self) -> tuple[Array, Array]:
@@ -362,8 +355,17 @@ class Flow:
         problem, state = self.solution.problem, self._state
         g = problem.grid
         span = 1.0 / state.s_p  # dp/ds
-        per_fall = np.exp(state.theta - state.f[DENSITY])  # dz/d ln p, which is T_surface at p = 0
-        if self._model.surface_stress == 0.0:
+        if self._model.beta == 0.0:
+            per_fall = np.exp(state.theta - state.f[DENSITY])  # dz/d ln p, which is T_surface at p = 0
+        else:
+            per_fall = state.p / np.maximum(_density(state.x, state.f), _SMALLEST_SHARE)
+        if self._model.unlimited:
+            # Less what goes like p^(-1-beta); the first piece of the grid is too short to count.
+            beta = self._model.beta
+            power = state.p[1:] ** -(1.0 + beta)
+            regular = np.zeros_like(span)
+            regular[1:] = (per_fall[1:] / state.p[1:] - self.surface_temperature * power) * span[1:]
+        elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
             regular[0] = g.derivative[0] @ per_fall
@@ -377,7 +379,11 @@ class Flow:
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
         z = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[0]
-        if self._model.surface_stress == 0.0:
+        if self._model.unlimited:
+            beta, mass = self._model.beta, self._state.mass[0]
+            powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
+            z = z + self.surface_temperature / beta * powers
+        elif self._model.surface_stress == 0.0:
             z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
@@ -406,14 +412,20 @@ class Flow:
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
         root_t = np.exp(0.5 * at["log_t"])
         s = stretch_position(share, self.solution.problem.stretch)
-        conducting = f[CONDUCTION] * root_t
+        conducting, beta = f[CONDUCTION] * root_t, self._model.beta
+        if beta == 0.0:
+            conductive = conducting * (rise + f[COUPLING] * (1.0 - rise))
+            along_density = -conducting * f[COUPLING] * (1.0 - rise)
+        else:
+            conductive = (1.0 + beta) * conducting * (rise + f[COUPLING] * (1.0 - rise))
+            along_density = conducting * (rise + beta) - conductive
         return {
             "volume_fraction": nu,
             "granular_temperature": root_t**2,
             "velocity": interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1],
             "heat_flux": at["y"] * p * root_t,
-            "conductive_heat_flux": conducting * (rise + f[COUPLING] * (1.0 - rise)),
-            "density_heat_flux": -conducting * f[COUPLING] * (1.0 - rise),
+            "conductive_heat_flux": conductive,
+            "density_heat_flux": along_density,
             "normal_stress": p,
             "shear_stress": -slope * p,
             "shear_rate": slope * f[WORK] * nu * root_t,
@@ -440,8 +452,8 @@ def rough_kinds(solutions: Sequence[Solution]) -> Array:
         parts.append(np.stack([np.exp(e.log_mass) * share + model.surface_stress, theta, y]))
         firsts.append(firsts[-1] + len(s))
     p, theta, y = np.concatenate(parts, axis=1)
-    f, _ = model.closures(p * np.exp(-theta))
-    rise, net = p * y / f[CONDUCTION] - 1.0, f[LOSS] - model.slope**2 * f[WORK]
+    f, _ = model.closures(model.density_argument(p, theta))
+    rise, net = p * y / f[CONDUCTION] - (1.0 + model.beta), f[LOSS] - model.slope**2 * f[WORK]
     each = firsts[:-1]
     return np.stack(
         [np.maximum.reduceat(rise, each), np.minimum.reduceat(net, each), np.maximum.reduceat(net, each)], axis=1

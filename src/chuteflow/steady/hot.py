@@ -17,6 +17,8 @@ from chuteflow import display
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
 from chuteflow.steady.chute import Chute
+from chuteflow.steady.kinds import INVERTED, MONOTONIC, interior_kind
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Field
 from chuteflow.theory.hot import (
     LAMBDA_C,
@@ -28,7 +30,6 @@ from chuteflow.theory.hot import (
     hot_solution,
     slope_bounds,
 )
-from chuteflow.theory.laws import law
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class HotModel:
         numbers = {"lambda": self.parameters.lambda_, "delta": self.parameters.delta}
         if self.mass_holdup is None:
             return display.line("HotModel", self.reason, **numbers)
-        density = "inverted" if self.inverted else "monotonic"
+        density = INVERTED if self.inverted else MONOTONIC
         return display.line("HotModel", f"{self.interior}, density {density}", **numbers, M=self.mass_holdup)
 
     @property
@@ -63,7 +64,8 @@ class HotModel:
         """Which the flow is, "dissipative" or "productive"."""
         if self.solution is None:
             return None
-        return "dissipative" if self.parameters.delta > 0.0 else "productive"
+        # Of one sign throughout the hot flow.
+        return interior_kind(self.parameters.delta, self.parameters.delta)
 
     @property
     def inverted(self) -> bool | None:
@@ -126,7 +128,8 @@ def hot(chute: Chute) -> HotModel:
     """
     if chute.surface != "free":
         raise InputError(f"surface = {chute.surface!r}: the model of hot flows has the surface 'free' alone")
-    limit = dilute(law(chute.closure), chute.restitution, chute.slope)
+    require_richman(chute.base, "the hot limit is")
+    limit = dilute(chute.law, chute.restitution, chute.slope)
     parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
     reason = parameters.obstacle
     return HotModel(

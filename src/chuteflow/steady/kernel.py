@@ -28,21 +28,37 @@ _LONGEST, _HALVINGS = 2.0, 8
 
 @compiled
 def closures(table: Any, x: float, f: Any) -> None:
-    """The closures at x and their derivatives with respect to ln x, into ``f`` (16,)."""
-    degree, pieces, width = table.shape
+    """The closures at x and their derivatives with respect to ln x, into ``f`` (16,).
+
+    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.Table`.
+    """
+    coefficients, edges = table
+    degree, pieces, width = coefficients.shape
     inner = math.log1p(x / OFFSET)
     c = math.log1p(inner)
     position = min(max(c, 0.0), UPPER) * (pieces / UPPER)
     i = min(int(position), pieces - 1)
     t = 2.0 * (position - i) - 1.0
+    if len(edges) > 0:
+        while position < edges[i]:
+            i -= 1
+        while position >= edges[i + 1] and i + 1 < pieces:
+            i += 1
+        t = 2.0 * (position - edges[i]) / (edges[i + 1] - edges[i]) - 1.0
     for q in range(width):
-        f[q] = table[degree - 1, i, q]
+        f[q] = coefficients[degree - 1, i, q]
     for d in range(degree - 2, -1, -1):
         for q in range(width):
-            f[q] = f[q] * t + table[d, i, q]
+            f[q] = f[q] * t + coefficients[d, i, q]
     by_log = x / ((x + OFFSET) * (1.0 + inner))
     for q in range(width // 2, width):
         f[q] *= by_log
+
+
+@compiled
+def density_argument(p: float, theta: float, beta: float) -> float:
+    """x at the normal stress p > 0 and the potential theta."""
+    return p * math.exp(-theta) if beta == 0.0 else math.exp((1.0 + beta) * math.log(p) - theta)
 
 
 @compiled
@@ -85,14 +101,16 @@ def _assemble(
 ) -> float:  # fmt: skip
     """Residuals and derivatives of all elements, condensed; the macroscopic quantities and their derivatives.
 
-    ``chute`` holds slope, p_S, y_S, base loss and the three coefficients of the slip; ``ends`` (N+1, 2) theta and y;
-    ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta, y and
-    mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
+    ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, beta and
+    the factor of GRIP in the loss; ``ends`` (N+1, 2) theta
+    and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta,
+    y and mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
     respect to theta at the Gauss points. Where ``local`` has six columns the last two are changes by what rounding
     does. Returns the largest residual, or infinity.
     """
-    slope, p_s = chute[0], chute[1]
+    slope, p_s, beta = chute[0], chute[1], chute[7]
+    rho = 1.0 + beta
     count = len(slopes)
     mass = math.exp(mu)
     whole = math.expm1(stretch)
@@ -119,14 +137,14 @@ def _assemble(
             q = over / p
             if not abs(theta) < 600.0:
                 return math.inf
-            x = p * math.exp(-theta)
+            x = density_argument(p, theta, beta)
             closures(table, x, f)
             inverse = 1.0 / f[CONDUCTION]
             inverse_x = -f[8 + CONDUCTION] * inverse * inverse
             k, k_x = f[COUPLING], f[8 + COUPLING]
             net = f[LOSS] - slope * slope * f[WORK]
             net_x = f[8 + LOSS] - slope * slope * f[8 + WORK]
-            v = p * y * inverse
+            v = p * y * inverse - beta
             exchange = 1.0 + 0.5 * (v + k * (1.0 - v))
             f_theta = w * y * inverse
             f_y = w * (net - y * exchange / p)
@@ -135,8 +153,8 @@ def _assemble(
             jac[j, 0, 1] = w * inverse
             jac[j, 1, 0] = -y_x
             jac[j, 1, 1] = -w * (exchange / p + 0.5 * y * (1.0 - k) * inverse)
-            local[e, 2 * j, 2] = f_theta + w * y * inverse_x * q
-            local[e, 2 * j + 1, 2] = f_y + w * y * q / p * (exchange - 0.5 * (1.0 - k) * v) + y_x * q
+            local[e, 2 * j, 2] = f_theta + w * y * inverse_x * rho * q
+            local[e, 2 * j + 1, 2] = f_y + w * y * q / p * (exchange - 0.5 * (1.0 - k) * (v + beta)) + y_x * rho * q
             local[e, 2 * j, 3] = f_theta - slopes[e, j, 0]
             local[e, 2 * j + 1, 3] = f_y - slopes[e, j, 1]
             for c in range(local.shape[2] - 4):
@@ -151,15 +169,18 @@ def _assemble(
             # Integrals of P dz and of P du.
             weight = h * gauss[1, j] * w
             heights = weight * over * math.exp(-math.log(x) - f[DENSITY])
-            root_t = math.exp(0.5 * (theta + f[GAMMA]))
+            log_t = theta + f[GAMMA]
+            if beta != 0.0:
+                log_t -= beta * math.log(p)
+            root_t = math.exp(0.5 * log_t)
             shear = weight * over * slope * f[WORK] * root_t
             moment += heights
             glide += shear
             density_x, work_x, gamma_x = f[8 + DENSITY], f[8 + WORK] / f[WORK], f[8 + GAMMA]
             by_slopes[1, e, j] = heights * (1.0 + density_x)
             by_slopes[0, e, j] = shear * (0.5 * (1.0 - gamma_x) - work_x)
-            moment_mu += heights * (2.0 - (1.0 + density_x) * q)
-            glide_mu += shear * (2.0 + (0.5 * gamma_x + work_x) * q)
+            moment_mu += heights * (2.0 - (1.0 + density_x) * rho * q)
+            glide_mu += shear * (2.0 + (0.5 * (gamma_x * rho - beta) + work_x * rho) * q)
         for j in range(STAGES):
             for i in range(STAGES):
                 for c in range(2):
@@ -172,28 +193,34 @@ def _assemble(
     # The base.
     p = mass + p_s
     q = mass / p
-    x = p * math.exp(-ends[count, 0])
-    closures(table, x, f)
+    closures(table, density_argument(p, ends[count, 0], beta), f)
     slip = chute[4] + chute[5] * f[SHEAR] + chute[6] * f[GRIP]
     slip_x = (chute[5] * f[8 + SHEAR] + chute[6] * f[8 + GRIP]) / slip
-    carried = slip * math.exp(0.5 * (ends[count, 0] + f[GAMMA])) * mass
+    log_t = ends[count, 0] + f[GAMMA]
+    if beta != 0.0:
+        log_t -= beta * math.log(p)
+    carried = slip * math.exp(0.5 * log_t) * mass
     flux = carried + glide
     if not (flux > 0.0 and moment > 0.0):
         return math.inf
-    by_ends[0, count, 2] = slope * slip - chute[3]  # heat flux that the base gives, and its derivative to ln x
-    by_ends[1, count, 2] = slope * slip * slip_x
+    by_ends[0, count, 2] = (
+        slope * slip - chute[3] - chute[8] * f[GRIP]
+    )  # heat flux that the base gives, and its derivative to ln x
+    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + GRIP]
     by_ends[0, count, 0] = carried * (0.5 * (1.0 - f[8 + GAMMA]) - slip_x) / flux
     by_ends[1, count, 0] = 0.0
-    by_ends[0, 0, 2] = (glide_mu + carried * (1.0 + (slip_x + 0.5 * f[8 + GAMMA]) * q)) / flux
+    by_ends[0, 0, 2] = (glide_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
     by_ends[1, 0, 2] = moment_mu / moment - 1.0
     by_slopes[0] /= flux
     by_slopes[1] /= moment
-    closures(table, p_s * math.exp(-ends[0, 0]), f)
+    closures(table, density_argument(p_s, ends[0, 0], beta) if p_s > 0.0 else 0.0, f)
     by_ends[0, 0, 1] = 1.0 - f[8 + GAMMA]  # d ln T_surface / d theta
     quantities[0] = math.log(flux)
     quantities[1] = math.log(moment / mass)
     quantities[2] = mu
     quantities[3] = ends[0, 0] + f[GAMMA]
+    if beta != 0.0 and p_s > 0.0:
+        quantities[3] -= beta * math.log(p_s)
     # Jumps between the elements.
     for e in range(count):
         h = breaks[e + 1] - breaks[e]
@@ -373,7 +400,7 @@ def iterate(
         mass = math.exp(mu)
         if not _step(
             gauss, integrals, breaks, chute, ends, slopes, local, quantities, by_ends, by_slopes, rows, values,
-            mass / (mass + chute[1]), change_ends, change_slopes,
+            (1.0 + chute[7]) * mass / (mass + chute[1]), change_ends, change_slopes,
         ):  # fmt: skip
             return mu, math.inf
         _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[1], change_slopes[1], rates)
@@ -432,7 +459,7 @@ def direction(
     mass = math.exp(mu)
     if not math.isfinite(size) or not _step(
         gauss, integrals, breaks, chute, ends, slopes, local, quantities, by_ends, by_slopes, rows,
-        np.array([0.0, 1.0]), mass / (mass + chute[1]), change_ends, change_slopes,
+        np.array([0.0, 1.0]), (1.0 + chute[7]) * mass / (mass + chute[1]), change_ends, change_slopes,
     ):  # fmt: skip
         return False
     _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[1], change_slopes[1], out)

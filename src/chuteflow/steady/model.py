@@ -10,22 +10,33 @@ on p_S <= p <= p_S + M is
     y = a theta',    p T'/T = p theta' + k (1 - p theta'),    k = (g4/g3) dnu/dln x
     p y' + y + y (p T'/T)/2 = p (loss - s^2 work)    (3.9)
     y = y_S at p_S,    y = base(nu) at p_S + M       (3.17), (3.18) with F2 = g1 base
+
+A law whose g4 grows like 1/nu where dilute, g4 = -b g3/nu, has T ~ p^(-beta) there, beta = b/(1 - b), and no
+temperature far above. What stays finite is theta = (ln T - Gamma(nu))/(1 - b) with Gamma = -b ln nu + ..., which is
+ln T + beta ln p far above. With x = p^(1 + beta) exp(-theta), a and k with respect to these, Gamma = ln(x/g1), and
+
+    ln T = theta + Gamma - beta ln p,    p theta' - beta in place of p theta' on the right sides
+
+the problem is the same, and beta = 0 gives the one above.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
+from chuteflow.errors import InputError
+from chuteflow.numerics.complex_step import stepped
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import Law, reduce, require_positive
-from chuteflow.theory.laws import law
+from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
@@ -34,9 +45,6 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
 UPPER, _PIECES, _DEGREE = 4.2, 200, 7
-
-#: Step along the imaginary axis of :func:`model_along`; its square is lost in rounding.
-IMAGINARY_STEP = 1e-20
 
 
 def _coordinate(x: Array) -> Array:
@@ -52,15 +60,20 @@ def _argument(c: Array) -> Array:
     return OFFSET * np.expm1(np.expm1(c))
 
 
-def closure_table(closure: Law, e: float, slope: float) -> Table:
-    """The eight functions of x for ``closure``."""
-    return _closure_table(closure, e, slope if closure.knows_slope else 0.0)
+def closure_table(closure: Law, e: float, slope: float, on: Base = BASES["richman"]) -> Table:
+    """The eight functions of x for ``closure``; the two of the base for that of the kind of ``on``."""
+    return _closure_table(closure, e, slope if closure.knows_slope else 0.0, BASES[on.name])
 
 
 # Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
-def _closure_table(chosen: Law, e: float, slope: float) -> Table:
-    density = _density_table(chosen, e, slope)
+def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
+    b = dilute_drift(chosen, e, slope)
+    breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
+    scaled_breaks = np.array([nu / (1.0 - nu / chosen.densest) for nu in breaks])
+    density = _density_table(chosen, e, slope, b, _coordinate(scaled_breaks).tolist())
+    (log_ratio, _), _ = density(_coordinate(scaled_breaks))
+    breaks_of_x = _coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
 
     def functions(c: Array) -> Array:
         x = _argument(c)
@@ -68,12 +81,15 @@ def _closure_table(chosen: Law, e: float, slope: float) -> Table:
         scaled = x * np.exp(ratio)
         r = reduce(chosen, scaled, e, slope)
         room = 1.0 / (1.0 + scaled / chosen.densest)
-        nu = scaled * room
         (_, gamma), _ = density(_coordinate(scaled))
-        k = r.coupling * nu / (r.stiffness + r.coupling * nu)
-        return np.stack([r.conduction, k, r.loss, r.work, r.shear, r.grip, ratio + np.log(room), gamma], axis=-1)
+        k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
+        # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
+        gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(room) + np.log(r.compressibility))
+        return np.stack(
+            [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + np.log(room), gamma], axis=-1
+        )
 
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
 
 def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
@@ -83,8 +99,9 @@ def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float) -> Table:
-    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*)."""
+def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence[float]) -> Table:
+    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
+    ``breaks`` are places where the law is not smooth."""
 
     def gamma_slope(c: Array) -> Array:
         scaled = _argument(c)
@@ -92,16 +109,18 @@ def _density_table(chosen: Law, e: float, slope: float) -> Table:
         rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
         return rate[:, None] * ((scaled + OFFSET) * (1.0 + np.log1p(scaled / OFFSET)))[:, None]
 
-    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE))
+    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE, breaks))
 
     def functions(c: Array) -> Array:
         scaled = _argument(c)
         room = 1.0 / (1.0 + scaled / chosen.densest)
         (big_gamma,), _ = gamma(c)
         log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
-        return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
+        if np.all(b == 0.0):
+            return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
+        return np.stack([np.log(room) + (log_g + big_gamma) / (1.0 - b), big_gamma], axis=-1)
 
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE)
+    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
 
 
 def _invert(density: Table, x: Array) -> Array:
@@ -133,8 +152,26 @@ class Model:
     table: Table
     surface_stress: float
     surface_flux: float
+    base: Base
     base_loss: float
+    loss_by_second: float
     slip_of_empty_base: float
+    beta: float
+
+    @property
+    def unlimited(self) -> bool:
+        """Whether the temperature has no limit far above, where it goes like p^(-beta)."""
+        return self.beta != 0.0 and self.surface_stress == 0.0
+
+    def density_argument(self, p: Array, theta: Array) -> Array:
+        """x at normal stresses ``p`` and potentials ``theta``: p exp(-theta) but where beta is not 0."""
+        if self.beta == 0.0:
+            return p * np.exp(-theta)
+        return np.exp((1.0 + self.beta) * log_stress(p) - theta)
+
+    def log_temperature(self, p: Array, theta: Array, gamma: Array) -> Array:
+        """ln T, given Gamma."""
+        return theta + gamma if self.beta == 0.0 else theta + gamma - self.beta * log_stress(p)
 
     def closures(self, x: Array) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
@@ -142,7 +179,7 @@ class Model:
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
-        return boundary.slip_coefficient(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
+        return self.base.slip(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
 
     def slip_slope(self, slopes: Array) -> Array:
         """Derivative of F1, given those of the closures: F1 is affine in them."""
@@ -150,7 +187,18 @@ class Model:
 
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
-        return self.slope * self.slip(closures) - self.base_loss
+        flux = self.slope * self.slip(closures) - self.base_loss
+        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[GRIP]
+
+    def base_flux_slope(self, slopes: Array) -> Array:
+        """Derivative of the flux that the base gives, given those of the closures: it is affine in them."""
+        slope = self.slope * self.slip_slope(slopes)
+        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[GRIP]
+
+    @cached_property
+    def kinks(self) -> Array:
+        """ln x at which the closures are not smooth, ascending."""
+        return np.log(_argument(np.array(self.table.breaks)))
 
     @cached_property
     def flux_scale(self) -> float:
@@ -163,16 +211,27 @@ class Model:
 
     @cached_property
     def constants(self) -> Array:
-        """Slope, p_S, y_S, base loss, and the slip coefficient F1 as an affine function of shear and grip, (7,)."""
+        """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of the two functions of the base,
+        beta, and the factor of the second function in the loss, (9,)."""
         unit = np.zeros((8, 2))
         unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
         by_shear, by_grip = self.slip_slope(unit)
         return np.array(
             [
                 self.slope, self.surface_stress, self.surface_flux, self.base_loss,
-                self.slip_of_empty_base, by_shear, by_grip,
+                self.slip_of_empty_base, by_shear, by_grip, self.beta, self.loss_by_second,
             ]
         )  # fmt: skip
+
+
+def beta_of(b: Any) -> Any:
+    """beta = b/(1 - b)."""
+    return b / (1.0 - b)
+
+
+def log_stress(p: Array) -> Array:
+    """ln p, as small as there are numbers at p = 0."""
+    return np.log(np.where(p == 0.0, np.finfo(float).tiny, p))
 
 
 def model(chute: Chute) -> Model:
@@ -181,29 +240,36 @@ def model(chute: Chute) -> Model:
     Raises:
         InputError: where that law has no meaning for the chute.
     """
-    return _registered(chute, law(chute.closure))
+    return _registered(chute, chute.law)
 
 
 @lru_cache(maxsize=256)
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)
-    return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope))
+    if chute.surface == "free" and dilute_drift(chosen, chute.restitution, chute.slope) >= 0.5:
+        raise InputError(
+            f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
+            "take a larger e, the surface interface or the Fourier form of the closure"
+        )
+    return _model(
+        chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, base(chute.base))
+    )
 
 
 def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
     """The continuous problem with one ``parameter`` of ``chute`` at ``value``, and that an imaginary step further.
 
-    The imaginary parts of what the second model gives, over :data:`IMAGINARY_STEP`, are exact derivatives with
-    respect to the parameter (J. N. Lyness and C. B. Moler 1967, SIAM J. Numer. Anal. 4, 202-210). The value may
-    lie a little beyond what a chute allows. ``parameter`` is one of PARAMETERS.
+    The imaginary parts of what the second model gives, over the step, are exact derivatives with respect to the
+    parameter (:mod:`chuteflow.numerics.complex_step`). The value may lie a little beyond what a chute allows.
+    ``parameter`` is one of PARAMETERS.
     """
     at = _parameters(chute) | {parameter: value}
-    beyond: dict[str, Any] = at | {parameter: np.complex128(value + 1j * IMAGINARY_STEP)}
-    chosen = law(chute.closure)
-    stepped = closure_table(chosen, beyond["restitution"], beyond["slope"])
-    table = replace(stepped, coefficients=np.ascontiguousarray(stepped.coefficients.real))
-    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, stepped)
+    beyond: dict[str, Any] = at | {parameter: np.complex128(stepped(value))}
+    chosen = chute.law
+    table_beyond = closure_table(chosen, beyond["restitution"], beyond["slope"], base(chute.base))
+    table = replace(table_beyond, coefficients=np.ascontiguousarray(table_beyond.coefficients.real))
+    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, table_beyond)
 
 
 def _parameters(chute: Chute) -> dict[str, Any]:
@@ -212,6 +278,8 @@ def _parameters(chute: Chute) -> dict[str, Any]:
 
 def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) -> Model:
     slope, roughness = parameters["slope"], parameters["roughness"]
+    on = base(chute.base)
+    loss, loss_by_second = on.loss(parameters["wall_restitution"], roughness)
     return Model(
         chute=chute,
         law=chosen,
@@ -220,6 +288,9 @@ def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) 
         table=table,
         surface_stress=boundary.surface_stress(chute.surface),
         surface_flux=boundary.surface_flux(chute.surface, slope),
-        base_loss=boundary.base_loss(parameters["wall_restitution"], roughness),
-        slip_of_empty_base=np.asarray(boundary.slip_coefficient(np.zeros(()), np.zeros(()), roughness, slope)).item(),
+        base=on,
+        base_loss=loss,
+        loss_by_second=loss_by_second,
+        beta=beta_of(dilute_drift(chosen, parameters["restitution"], slope)),
+        slip_of_empty_base=np.asarray(on.slip(np.zeros(()), np.zeros(()), roughness, slope)).item(),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -12,9 +12,11 @@ from chuteflow.checks import real
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import newton
+from chuteflow.steady import kinks
 from chuteflow.steady.collocation import LOG_M, LOG_T, Collocation, State
-from chuteflow.steady.elements import MOST_ELEMENTS, Elements
+from chuteflow.steady.elements import MOST_ELEMENTS, Elements, Iterate
 from chuteflow.steady.model import Model
+from chuteflow.theory.constitutive import Law
 from chuteflow.threads import on_one_thread
 
 #: Relative tolerance in Q, h and M unless another is asked for.
@@ -25,6 +27,8 @@ _FLOOR, _SAFETY = 1e-12, 4.0
 _STEP, _MOST_STEPS = 1e-7, 40
 #: After one below this the finer flow is as good as its mesh.
 _FINE_STEP = 1e-6
+#: Rounds in which the ends of elements come to where the flow passes a break of the law.
+_MOST_ROUNDS = 12
 #: The hold-up fixes a flow where it is this part of the change along the branch.
 _STEEP = 1e-3
 #: A grid resolves a flow where its integrals agree to this.
@@ -63,14 +67,15 @@ class Condition:
 class Solution:
     """A discretised flow: ``macroscopic`` (ln Q, ln h, ln M, ln T_surface), their error, and how it ended.
 
-    ``source`` is the flow on elements, as it was solved, or on a Chebyshev grid with its unknowns. ``rates`` (4,) are
+    ``source`` is the flow on elements, as it was solved, or on a Chebyshev grid with its unknowns; or the law that
+    would be needed for either, where a file was written with one that is not registered here. ``rates`` (4,) are
     the derivatives of the macroscopic quantities along the branch, with the value of the condition that was solved.
     """
 
     macroscopic: Array
     error: float
     status: Status
-    source: Elements | tuple[Collocation, Array]
+    source: Elements | tuple[Collocation, Array] | Law
     rates: Array | None = None
 
     @property
@@ -80,11 +85,17 @@ class Solution:
 
     @cached_property
     def elements(self) -> Elements:
-        """The flow on elements."""
-        return self.source if isinstance(self.source, Elements) else Elements.of_collocation(*self.source)
+        """The flow on elements.
+
+        Raises:
+            InputError: where its law is not known.
+        """
+        return self.source if isinstance(self.source, Elements) else Elements.of_collocation(*self._on_grid)
 
     @cached_property
     def _on_grid(self) -> tuple[Collocation, Array]:
+        if isinstance(self.source, Law):
+            self.source.at(np.zeros(1), 1.0, 1.0)  # says what is missing
         return self.source if isinstance(self.source, tuple) else collocate(self)
 
     @property
@@ -140,12 +151,24 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     weights = np.array([0.0, 0.0, 1.0, 0.0])
     if rates is not None and abs(rates[LOG_M]) < _STEEP * np.linalg.norm(rates):
         weights = rates / np.linalg.norm(rates)
-    value = np.array(float(weights @ solution.macroscopic))
+    value = float(weights @ solution.macroscopic)
+    found, agrees = _on_grids(solution, weights, value)
+    if not agrees and solution.error > TOLERANCE:
+        # A flow that was asked for roughly: between the ends of its elements it has fewer digits than its integrals.
+        finer = solve(solution.elements.halved(), Condition(tuple(weights.tolist()), value), TOLERANCE)
+        if finer.converged:
+            found, _ = _on_grids(finer, weights, value)
+    return found
+
+
+def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[Collocation, Array], bool]:
+    """The problem on the grid that resolves a flow best and its unknowns, and whether its integrals are the flow's."""
     last: tuple[Collocation, Array] | None = None
-    resolved = False
-    for problem, rough in solution.elements.grids():
+    agreed = resolved = False
+    elements = solution.elements
+    for problem, rough in elements.grids(kinks.crossings(elements)):
         found = newton(
-            lambda z, problem=problem: _system(problem.state(z), weights, value),
+            lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
             rough,
             tolerance=_STEP,
             longest_step=2.0,
@@ -154,12 +177,13 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
         agrees = found.converged and bool(off < max(_AGREES, solution.error))
         if agrees or last is None:
             last = problem, found.z if agrees else rough
+        agreed |= agrees
         # One grid more than it takes for the integrals: profiles want it.
         if agrees and resolved:
             break
         resolved = agrees
     assert last is not None
-    return last
+    return last, agreed
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
@@ -181,9 +205,9 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     very close to a fold.
     """
     weights, value = np.array(condition.weights), condition.value
-    coarse = start.iterated(weights, value, _STEP, _MOST_STEPS)
+    coarse = _iterated(start, weights, value, _STEP)
     while np.isfinite(coarse.step):
-        fine = coarse.flow.halved().iterated(weights, value, _FINE_STEP, _MOST_STEPS, rounding=True)
+        fine = _iterated(coarse.flow.halved(), weights, value, _FINE_STEP, rounding=True)
         if not np.isfinite(fine.step):
             break
         change = float(np.abs(fine.quantities - coarse.quantities).max())
@@ -194,6 +218,25 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
             return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
         coarse = fine
     return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
+
+
+def _iterated(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:
+    """Newton's method until a step is below ``step``, on elements that end where the flow passes a break of the law."""
+    if not start.model.kinks.size:
+        return start.iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+    places = kinks.crossings(start)
+    distance, found = np.inf, None
+    for _ in range(_MOST_ROUNDS):
+        found = kinks.with_ends(start, places).iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+        if not np.isfinite(found.step):
+            break
+        start, places = found.flow, kinks.crossings(found.flow)
+        before, distance = distance, kinks.distance(start, places)
+        # Rounding leaves more of a distance where the density hardly changes.
+        if distance < kinks.MEETS or (distance < kinks.NEAR and distance > 0.1 * before):
+            return found
+    assert found is not None
+    return replace(found, step=np.inf)
 
 
 def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:

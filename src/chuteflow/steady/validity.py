@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: Volume fraction above which grains form clusters and chains, and dissipation is less than here (Jenkins 2007).
-CLUSTERED = 0.49
+from chuteflow.theory.constitutive import CLUSTERED
+
 #: Share of the densest packing of the law above which contacts last.
 PACKED = 0.95
 #: Slip velocity over sqrt(T) at the base above which slip is large: Richman (1988) takes it to be small.
@@ -40,7 +40,8 @@ class Validity:
     ``largest_volume_fraction`` is nu_max and ``packing`` its share of the densest packing nu* of the law;
     ``slip_ratio`` is the slip velocity over sqrt(T) at the base; ``knudsen_number`` the mean free path over the
     height of the centre of mass, the path being d/(6 sqrt(2) nu g0) with the mean of nu g0 over all grains;
-    ``density_turns`` counts how often the density turns between rising and falling with height.
+    ``density_turns`` counts how often the density turns between rising and falling with height; ``dense_limit`` is the
+    volume fraction up to which the law is meant.
     """
 
     largest_volume_fraction: float
@@ -48,6 +49,7 @@ class Validity:
     slip_ratio: float
     knudsen_number: float
     density_turns: int
+    dense_limit: float = CLUSTERED
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -55,7 +57,7 @@ class Validity:
         packed = self.packing > PACKED
         passed = (
             packed,
-            self.largest_volume_fraction > CLUSTERED and not packed,
+            self.largest_volume_fraction > self.dense_limit and not packed,
             self.slip_ratio > SLIP,
             self.knudsen_number > RAREFIED,
             self.density_turns >= TURNS,

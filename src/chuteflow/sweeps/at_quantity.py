@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.rough_turns import may_turn
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.roots import zeros
 from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
-from chuteflow.sweeps.zeros import zeros
 
 #: Columns per decade of surface temperature to begin with.
 _PER_DECADE = 4

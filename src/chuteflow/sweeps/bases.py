@@ -20,7 +20,7 @@ from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
 #: Accuracies, one after the other: a lane goes on to the next until its flows are settled.
 LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Accuracy(1e-12, 1e-8))
 #: The error claimed is this many times the change from one accuracy to the next.
-SAFETY = 2.0
+SAFETY = 3.0
 #: The least error ever claimed, and in the tolerance of a step: two integrations may agree by chance.
 _FLOOR, _CHANCE = 1e-12, 0.5
 #: The finer integrations end a little below the last flow.

@@ -31,8 +31,9 @@ Indices = NDArray[np.intp]
 #: Rows of a state: ln p, ln X, y, the integral of P dz over p, that of P du over p^2, and that of dz.
 LOG_P, LOG_X, FLUX, MOMENT, GLIDE, HEIGHT = range(6)
 ROWS = 6
-#: Densities at which the speed of a lane's equations is looked up.
+#: Densities at which the speed of a lane's equations is looked up, and others at which the sign of net is.
 _DENSITIES = np.append(0.0, np.logspace(-3.0, 4.0, 15))
+_SIGNS = np.append(0.0, np.logspace(-2.5, 4.0, 60))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class Batch:
     @classmethod
     def of(
         cls,
-        closure: str,
+        closure: str | Law,
         surface: str,
         slope: Array,
         restitution: Array,
@@ -81,6 +82,12 @@ class Batch:
         """p_S."""
         return boundary.surface_stress(self.surface)
 
+    @property
+    def has_limit(self) -> NDArray[np.bool_]:
+        """Whether the temperature of the law has a limit far above, (n,)."""
+        nothing = np.zeros(len(self))
+        return reduce(self.law, nothing, cast(Any, self.restitution), cast(Any, self.slope)).drift == 0.0
+
     def along(self, state: Array) -> Along:
         """Everything pointwise at states (ROWS, n)."""
         return Along(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])
@@ -97,6 +104,17 @@ class Batch:
         rate = np.sqrt(2.0 * np.abs(net) / conduction).max(axis=0)
         balance = np.sqrt(2.0 * np.maximum(net, 0.0) * conduction).max(axis=0)
         return rate, balance
+
+    def winding(self) -> NDArray[np.bool_]:
+        """Where loss and work balance at two densities (n,): deep trajectories then wind round the denser one, and
+        flows multiply with the hold-up, in windows of the surface temperature that no columns show."""
+        changes = np.zeros(len(self), dtype=np.intp)
+        positive = None
+        for x in _SIGNS.tolist():
+            _, net, _, _ = self.at_density(np.full(len(self), x))
+            changes += 0 if positive is None else (net > 0.0) != positive
+            positive = net > 0.0
+        return changes > 1
 
 
 _ZERO, _ONE = np.zeros(()), np.ones(())
@@ -115,7 +133,7 @@ class Along:
         self._batch, self._reduced = batch, r
         self.p, self.log_x, self.y = p, log_x, y
         self.nu = x * room
-        coupled = r.coupling * self.nu
+        coupled = r.drift
         stiff = r.stiffness + coupled
         self.coupling = coupled / stiff
         self.ease = 1.0 / (stiff * room)  # dL/dln x

@@ -103,6 +103,10 @@ class Design:
         return cls(points, axes, rows)
 
 
+#: Parameters that take other words than those that have a number of their own.
+OPEN = ("closure", "base")
+
+
 def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], str]]) -> Axis:
     """The axis that a value of the study's table describes: one value, a list of them, or a range.
 
@@ -113,9 +117,11 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     if name in words:
         known = words[name][0]
         names = _listed(value)
-        for one in names:
+        for one in dict.fromkeys(map(_hashable, names)):
             if one not in known:
-                raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
+                if name not in OPEN or not isinstance(one, str):
+                    raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
+                known = (*known, one)
         if not names:
             raise InputError(f"{key} = []: give at least one value")
         return Axis(name, np.array([known.index(one) for one in names], dtype=float), known)
@@ -127,6 +133,10 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     if not values:
         raise InputError(f"{key} = []: give at least one value")
     return Axis(name, np.array([number(key, one) for one in values]))
+
+
+def _hashable(value: Any) -> Any:
+    return value if isinstance(value, str) else shown(value)
 
 
 def _listed(value: Any) -> list[Any]:

@@ -22,9 +22,9 @@ from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
-from chuteflow.sweeps.study import RANGES, WORDS, Study
+from chuteflow.sweeps.study import RANGES, Study
+from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
-from chuteflow.theory.laws import LAWS, law
 
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
@@ -36,8 +36,8 @@ _FAILURES = (ChuteflowError, ArithmeticError, ValueError, LookupError)
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """The points of a chunk: ``parameters`` by name (n,), ``status``, ``reason`` and ``n_flows`` (n,), ``error`` and
-    the ``quantities`` (n, flows); ``failures`` says of the points that failed why, and ``singly`` how many points
-    were solved one by one."""
+    the ``quantities`` (n, flows); ``failures`` says of the points that failed why. So many points were solved
+    one by one: ``winding`` since trajectories wind there, ``singly`` for other reasons."""
 
     parameters: Mapping[str, Array]
     status: Flags
@@ -47,6 +47,7 @@ class Chunk:
     quantities: Mapping[str, NDArray[Any]]
     failures: Mapping[int, str]
     singly: int
+    winding: int
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """All arrays by the names that they have in a store."""
@@ -65,19 +66,30 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     first, last = study.extent(chunk)
     out = _empty(study, study.design.rows(first, last), last - first)
     failures: dict[int, str] = {}
-    valid = _valid(out.parameters, study.condition, failures)
+    valid = _valid(study, out.parameters, failures)
     out.status[~valid] = Status.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
-    singly = 0
-    for closure, surface, members in _groups(out.parameters, valid):
+    # Lanes side by side have the base of the paper.
+    other = _on_other_bases(study, out.parameters) & valid
+    singly, winding = int(other.sum()), 0
+    for point in np.flatnonzero(other).tolist():
+        _fill_singly(study, out, point, failures)
+    out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+    valid &= ~other
+    for closure, surface, members in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)
-        solved = _solved(study, batch, out.parameters[study.condition][members])
-        _fill(study, out, members, solved)
-        for lane in np.flatnonzero(solved.unsettled).tolist():
-            singly += 1
-            _fill_singly(study, out, int(members[lane]), failures)
+        # Surface temperatures that are given are followed down one by one; no family of flows has to be found.
+        winds = batch.winding() if study.condition != "T_surface" else np.zeros(len(batch), dtype=bool)
+        others = np.flatnonzero(~winds)
+        solved = _solved(study, batch.take(others), out.parameters[study.condition][members[others]])
+        _fill(study, out, members[others], solved)
+        for point in [*members[winds].tolist(), *members[others[solved.unsettled]].tolist()]:
+            _fill_singly(study, out, point, failures)
+        winding += int(winds.sum())
+        singly += int(solved.unsettled.sum())
         _fill_reasons(out, batch, members)
-    return Chunk(**{**vars(out), "failures": {first + i: why for i, why in sorted(failures.items())}, "singly": singly})
+    told = {first + i: why for i, why in sorted(failures.items())}
+    return replace(out, failures=told, singly=singly, winding=winding)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
@@ -94,35 +106,37 @@ def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
         },
         failures={},
         singly=0,
+        winding=0,
     )
 
 
-def _valid(parameters: Mapping[str, Array], condition: str, failures: dict[int, str]) -> NDArray[np.bool_]:
+def _valid(study: Study, parameters: Mapping[str, Array], failures: dict[int, str]) -> NDArray[np.bool_]:
     """Which points are chutes with a condition in range; why the others are not, into ``failures``."""
     valid = np.ones(len(parameters["slope"]), dtype=bool)
-    for name in (*BY_KEY, condition):
+    for name in (*BY_KEY, study.condition):
         low, high = RANGES[name]
         off = ~((parameters[name] >= low) & (parameters[name] <= high))
         for i in np.flatnonzero(off & valid).tolist():
             failures[i] = f"{name} = {parameters[name][i]:g}: must be from {low:g} to {high:g}"
         valid &= ~off
-    for i in np.flatnonzero(valid & ~_surely_meaningful(parameters, valid)).tolist():
+    for i in np.flatnonzero(valid & ~_surely_meaningful(study, parameters, valid)).tolist():
         try:
-            require_positive(law(_word("closure", parameters, i)), parameters["e"][i], parameters["slope"][i])
+            chosen = study.laws[int(parameters["closure"][i])]
+            require_positive(chosen, float(parameters["e"][i]), float(parameters["slope"][i]))
         except InputError as error:
             valid[i] = False
             failures[i] = str(error)
     return valid
 
 
-def _surely_meaningful(parameters: Mapping[str, Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _surely_meaningful(study: Study, parameters: Mapping[str, Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Where the law has a meaning at a slightly smaller and a slightly larger restitution, and for every slope."""
     place = np.where(valid, parameters["e"], 0.0) * (_RESTITUTIONS - 1)
     below, above = np.floor(place).astype(np.intp), np.ceil(place).astype(np.intp)
     out = np.zeros(len(valid), dtype=bool)
-    for i, name in enumerate(LAWS):
-        if not law(name).knows_slope:
-            good = _meaningful(law(name))
+    for i, chosen in enumerate(study.laws):
+        if not chosen.knows_slope and (parameters["closure"] == i).any():
+            good = _meaningful(chosen)
             out |= (parameters["closure"] == i) & good[below] & good[above]
     return out
 
@@ -140,20 +154,18 @@ def _meaningful(closure: Law) -> NDArray[np.bool_]:
     return good
 
 
-def _word(name: str, parameters: Mapping[str, Array], i: int) -> str:
-    return WORDS[name][0][int(parameters[name][i])]
-
-
-def _groups(parameters: Mapping[str, Array], valid: NDArray[np.bool_]) -> Iterator[tuple[str, str, Indices]]:
+def _groups(
+    study: Study, parameters: Mapping[str, Array], valid: NDArray[np.bool_]
+) -> Iterator[tuple[Law, str, Indices]]:
     """Closure, surface and points of the groups that share both."""
-    for i, closure in enumerate(LAWS):
+    for i, closure in enumerate(study.laws):
         for j, surface in enumerate(SURFACES):
             members = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
             if members.size:
                 yield closure, surface, members
 
 
-def _batch(closure: str, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
+def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
     roughness = np.minimum(parameters["roughness"][members], BY_KEY["roughness"].high)
     slope, e, ew = (np.ascontiguousarray(parameters[name][members]) for name in ("slope", "e", "ew"))
     return Batch.of(closure, surface, slope, e, ew, roughness)
@@ -169,8 +181,9 @@ class _Solved:
 
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
-    """Every flow of the batch at the condition's values (n,); none where they are to be judged one by one."""
-    if wanted(study.quantities):
+    """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
+    are judged, or the law has breaks, at which integration side by side would lose its order."""
+    if not len(batch) or wanted(study.quantities) or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
@@ -228,15 +241,21 @@ def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
         out.quantities[name][where] = values[kept]
 
 
+def _on_other_bases(study: Study, parameters: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which points have another base than that of the paper."""
+    others = [i for i, one in enumerate(study.bases) if one != BASES["richman"]]
+    return np.isin(parameters["base"], others) if others else np.zeros(len(parameters["slope"]), dtype=bool)
+
+
 def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str]) -> None:
     """Solve one point by the search of :func:`chuteflow.flows`."""
     p = out.parameters
     slope, e, ew, roughness = (float(p[name][point]) for name in BY_KEY)
-    surface, closure = (_word(name, p, point) for name in WORDS)
+    surface, closure = SURFACES[int(p["surface"][point])], study.laws[int(p["closure"][point])]
     condition = {study.condition: float(p[study.condition][point])}
     try:
         found = search(
-            Chute(slope, e, ew, roughness, surface, closure),
+            Chute(slope, e, ew, roughness, surface, closure, study.bases[int(p["base"][point]) if "base" in p else 0]),
             **condition,
             tolerance=study.tolerance,
             surface_temperature=study.surface_temperature,

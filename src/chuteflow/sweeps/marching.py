@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.roots import zeros
 from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Along, Batch, Indices
-from chuteflow.sweeps.zeros import zeros
 
 Event = Callable[[Along, Indices], Array]
 

@@ -9,14 +9,13 @@ import numpy as np
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.steady.flow import CUTOFF
+from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.sweeps.bases import Flows
 from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
 
 #: Names of kinds in the order of their flags.
-INTERIORS = ("dissipative", "mixed", "productive")
-DENSITIES = ("monotonic", "inverted")
 KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **JUDGED_KINDS}
 #: With which flows are looked at once more for what happens on the way to the base.
 _ACCURACY = Accuracy(1e-10, 1e-7)

@@ -48,11 +48,13 @@ def reasons(batch: Batch) -> Flags:
     out = np.full(len(batch), int(Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED), dtype=np.int8)
     # lambda = 3 F21^2/(2 g30 delta), which is 3 where the base's flux is the largest that can be lost (4.14).
     steep = (net > 0.0) & (base > np.sqrt(2.0 * np.maximum(net, 0.0) * conduction))
+    # Without a temperature far above there are no hot flows of this kind.
+    limited = batch.has_limit
     free = batch.surface_stress == 0.0
     for reason, where in (
-        (Reason.TOO_STEEP_FOR_HOT_FLOWS_NO_OTHER_FOUND, steep),
-        (Reason.HOT_FLOWS_LOSE_ENERGY_NO_OTHER_FOUND, (net > 0.0) & (base <= 0.0)),
-        (Reason.HOT_FLOWS_GAIN_ENERGY_NO_OTHER_FOUND, (net < 0.0) & (base >= 0.0)),
+        (Reason.TOO_STEEP_FOR_HOT_FLOWS_NO_OTHER_FOUND, limited & steep),
+        (Reason.HOT_FLOWS_LOSE_ENERGY_NO_OTHER_FOUND, limited & (net > 0.0) & (base <= 0.0)),
+        (Reason.HOT_FLOWS_GAIN_ENERGY_NO_OTHER_FOUND, limited & (net < 0.0) & (base >= 0.0)),
         (Reason.BASE_AND_INTERIOR_GAIN_ENERGY, (highest <= 0.0) & (least >= 0.0)),
         (Reason.BASE_AND_INTERIOR_LOSE_ENERGY, free & (lowest >= 0.0) & (most <= 0.0)),
     ):

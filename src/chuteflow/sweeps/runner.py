@@ -29,7 +29,7 @@ _MOST_DEATHS = 3
 
 @dataclass(frozen=True)
 class Workers:
-    """``count`` workers, how to ``start`` them, anew where they died, and what is raised when one has: ``deaths``."""
+    """``count`` workers, how to ``start`` them, also where some died, and what is raised when one has: ``deaths``."""
 
     count: int
     start: Callable[[], AbstractContextManager[Executor]]

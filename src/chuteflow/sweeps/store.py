@@ -7,7 +7,7 @@ of them hold. Whatever is killed or damaged at whatever moment leaves chunks tha
 computed again, to the same bits.
 
     study.zarr/                      zarr.json, and one folder for each array
-    study.zarr/.chuteflow/           study.json, columns/NAME.npy, lock, done/NUMBER.json, partial/
+    study.zarr/.chuteflow/           study.json, folder, columns/NAME.npy, lock, done/NUMBER.json, partial/
 
 Stores of version 0.1.0 have no checksums. Their chunks are done if they can be read, with the parameters of their
 points and the counts of their markers.
@@ -41,9 +41,11 @@ from chuteflow.sweeps.designs import shown_path
 from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import Reason, Status, meanings
-from chuteflow.sweeps.study import WORDS, Column, Study, from_canonical
+from chuteflow.sweeps.study import Column, Study, from_canonical
 
 _OWN, _DONE, _PARTIAL, _COLUMNS = ".chuteflow", "done", "partial", "columns"
+#: The file that holds the folder of the study, in which the laws of files are looked for.
+_FOLDER = "folder"
 _LEVEL = 1
 #: The version whose markers name none.
 _FIRST_VERSION = "0.1.0"
@@ -60,6 +62,7 @@ _LONG_NAMES = {
     **{key: parameter.description for key, parameter in BY_KEY.items()},
     "surface": "surface condition",
     "closure": "constitutive law",
+    "base": "condition at the base",
     **{key: f"{condition.description} asked for" for key, condition in CONDITIONS.items()},
 }
 
@@ -130,11 +133,14 @@ class Variable:
 def variables(study: Study) -> dict[str, Variable]:
     """All arrays of the store of a study."""
     out: dict[str, Variable] = {}
-    for name in study.design.axes:
-        words = WORDS[name][0] if name in WORDS else ()
+    for name, axis in study.design.axes.items():
+        words = axis.words
         attributes: dict[str, Any] = {"long_name": _LONG_NAMES[name]}
         if words:
-            attributes |= {"flag_values": list(range(len(words))), "flag_meanings": " ".join(words)}
+            attributes |= {
+                "flag_values": list(range(len(words))),
+                "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
+            }
         else:
             attributes |= {"units": "1"}
         out[name] = Variable("int8" if words else "float64", -1 if words else float("nan"), False, attributes)
@@ -231,7 +237,7 @@ class Store:
             raise InputError(f"{shown_path(path)} is no store of a study: take a path that does not exist yet")
         try:
             text = (own / "study.json").read_text(encoding="utf-8")
-            return cls(Path(path), _study(text, own / _COLUMNS))
+            return cls(Path(path), _study(text, own / _COLUMNS, _folder(own)))
         except (OSError, ValueError) as error:
             # An InputError of the study is a ValueError.
             why = getattr(error, "strerror", None) or error
@@ -247,6 +253,7 @@ class Store:
             content = io.BytesIO()
             np.save(content, column, allow_pickle=False)
             _put(self._own / _COLUMNS / f"{name}.npy", content.getvalue())
+        _put(self._own / _FOLDER, str(self.study.folder).encode())
         _put(self._own / "study.json", self.study.canonical.encode())
 
     # What is done
@@ -454,11 +461,19 @@ class Store:
 
 
 @lru_cache(maxsize=4)
-def _study(text: str, columns: Path) -> Study:
+def _study(text: str, columns: Path, folder: Path) -> Study:
     def column(name: str) -> Column:
         return np.load(columns / f"{name}.npy", allow_pickle=False)
 
-    return from_canonical(text, column)
+    return from_canonical(text, column, folder)
+
+
+def _folder(own: Path) -> Path:
+    """The folder of the study; stores of earlier versions do not tell, and need none."""
+    try:
+        return Path((own / _FOLDER).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return Path()
 
 
 @lru_cache(maxsize=4)

@@ -32,7 +32,9 @@ from chuteflow.sweeps.designs import (
     shown_path,
 )
 from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
-from chuteflow.theory.laws import LAWS
+from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.theory.constitutive import Law, digest
+from chuteflow.theory.laws import in_folder, law
 
 #: A list of numbers or words.
 Column = NDArray[Any]
@@ -41,8 +43,12 @@ Column = NDArray[Any]
 RANGES = {key: (parameter.low, parameter.highest) for key, parameter in BY_KEY.items()} | {
     key: (condition.low, condition.high) for key, condition in CONDITIONS.items()
 }
-#: Names, and what they are where a study does not give them.
-WORDS = {"surface": (SURFACES, "free"), "closure": (tuple(LAWS), "lun")}
+#: Names, and what they are where a study does not give them. Other closures of a study are numbered after these.
+WORDS = {"surface": (SURFACES, "free"), "closure": (("lun", "lun-fourier"), "lun"), "base": (("richman",), "richman")}
+#: Those that a study without them does not have at all, as those of earlier versions.
+_OPTIONAL = ("base",)
+#: Restitution and slope at which values of a law are taken, by which it is known again.
+_KNOWN_BY = (0.9, 0.3)
 #: Kinds of a flow that can be kept beside the numbers of the registry.
 KINDS = ("interior", "density", *JUDGED_KINDS)
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
@@ -79,6 +85,10 @@ class Study:
     canonical: str = field(default="", compare=False)
     #: Lists of values that are too long for the canonical form, by the name of their parameter.
     columns: Mapping[str, Column] = field(default_factory=dict, compare=False, repr=False)
+    #: The laws and the bases in the order of their numbers, and the folder to which those of files are relative.
+    laws: tuple[Law, ...] = field(default=(), compare=False, repr=False)
+    bases: tuple[Base, ...] = field(default=(BASES["richman"],), compare=False, repr=False)
+    folder: Path = field(default_factory=Path, compare=False, repr=False)
 
     @property
     def points(self) -> int:
@@ -126,8 +136,9 @@ def read(path: str | os.PathLike[str]) -> Study:
     return from_dict(given, source.parent)
 
 
-def from_canonical(text: str, column: Callable[[str], Column] | None = None) -> Study:
-    """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it.
+def from_canonical(text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()) -> Study:
+    """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it; laws
+    of files are looked for from ``folder``.
 
     Raises:
         InputError: for what is no canonical form, or a column that is not the one meant.
@@ -144,7 +155,13 @@ def from_canonical(text: str, column: Callable[[str], Column] | None = None) -> 
             parameters[name] = column(name)
             if _outline(parameters[name]) != value:
                 raise InputError(f"the list of parameters.{name} is damaged")
-    return from_dict(given | {"parameters": parameters}, Path())
+    closures = given.pop("closures", {})
+    study = from_dict(given | {"parameters": parameters}, folder)
+    known = _closures(study)
+    for name, kept in closures.items() if isinstance(closures, dict) else ():
+        if known.get(name) != kept:
+            raise InputError(f"the closure {name!r} is another now than that of the study: it gives other numbers")
+    return study
 
 
 def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
@@ -169,7 +186,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
         axes = {name: axis_from(name, value, WORDS) for name, value in parameters.items()}
     condition = _checked_names(axes)
     for name, (_, default) in WORDS.items():
-        if name not in axes:
+        if name not in axes and name not in _OPTIONAL:
             axes[name] = axis_from(name, default, WORDS)
     if kind != "list":
         for axis in axes.values():
@@ -198,6 +215,10 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     )
     columns = {name: _column(name, value) for name, value in parameters.items() if _is_long(value)}
     object.__setattr__(study, "columns", columns)
+    object.__setattr__(study, "folder", folder.absolute())
+    if "base" in axes:
+        object.__setattr__(study, "bases", tuple(_base(name) for name in axes["base"].words))
+    object.__setattr__(study, "laws", tuple(_law(name, folder) for name in axes["closure"].words))
     object.__setattr__(study, "canonical", _canonical(study, kind, head, {**parameters, **columns}))
     return study
 
@@ -210,7 +231,7 @@ def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Map
         "design": {"kind": kind, **settings},
         # In their order, in which the points are counted.
         "parameters": {n: _plain(v) for n, v in parameters.items()}
-        | {n: d for n, (_, d) in WORDS.items() if n not in parameters},
+        | {n: d for n, (_, d) in WORDS.items() if n not in (*parameters, *_OPTIONAL)},
         "search": {
             "tolerance": study.tolerance,
             "surface_temperature": list(study.surface_temperature),
@@ -218,7 +239,39 @@ def _canonical(study: Study, kind: str, head: Mapping[str, Any], parameters: Map
         },
         "results": {"quantities": list(study.quantities), "flows": study.flows, "chunk": study.chunk},
     }
+    closures = _closures(study)
+    if closures:
+        whole["closures"] = closures
     return json.dumps(whole, allow_nan=False, separators=(",", ":"))
+
+
+def _law(name: str, folder: Path) -> Law:
+    try:
+        return law(in_folder(name, folder))
+    except InputError as error:
+        raise InputError(f"parameters.closure: {error}") from None
+
+
+def _base(name: str) -> Base:
+    try:
+        return base(name)
+    except InputError as error:
+        raise InputError(f"parameters.base: {error}") from None
+
+
+def _closures(study: Study) -> dict[str, Any]:
+    """What the canonical form has of the laws that are not the paper's: parameters, and what tells their values."""
+    names = study.design.axes["closure"].words
+    return {
+        name: {
+            "law": chosen.name,
+            "source": chosen.source,
+            "parameters": chosen.parameters,
+            "digest": digest(chosen, *_KNOWN_BY),
+        }
+        for name, chosen in zip(names, study.laws, strict=True)
+        if name not in WORDS["closure"][0]
+    }
 
 
 def _is_long(value: Any) -> bool:

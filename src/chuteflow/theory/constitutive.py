@@ -17,9 +17,10 @@ theta is uniform wherever there is no heat flux, however the density varies.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ from chuteflow.errors import InputError
 #: An array of values at given states.
 Field = NDArray[Any]
 
+#: Volume fraction above which grains form clusters and chains, and dissipation is less than of single collisions
+#: (Jenkins 2007).
+CLUSTERED = 0.49
 #: Contact value in Richman's A(nu): d = d_w in (2.12).
 WALL_CONTACT = np.pi / (12.0 * np.sqrt(2.0))
 
@@ -39,7 +43,8 @@ class Coefficients:
 
     ``radial`` is g0; ``compressibility`` is G = g1/nu and ``compressibility_slope`` dG/dnu;
     ``viscosity`` g2; ``conductivity`` g3; ``density_conductivity`` g4;
-    ``dissipation`` g5/nu^2; ``bulk_viscosity`` g6.
+    ``dissipation`` g5/nu^2; ``bulk_viscosity`` g6. A law whose g4 grows like 1/nu where dilute also gives
+    ``density_flux`` = nu g4.
     """
 
     radial: Field
@@ -50,6 +55,25 @@ class Coefficients:
     density_conductivity: Field
     dissipation: Field
     bulk_viscosity: Field
+    density_flux: Field | None = None
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """The function of a law that is known by its description alone, such as that of a file written elsewhere."""
+
+    name: str
+
+    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+        """Nothing.
+
+        Raises:
+            InputError: always, saying what is missing.
+        """
+        raise InputError(
+            f"closure {self.name!r} is not registered here: what was saved can be read, but nothing more can be "
+            "computed with it before it is, or before it is given as FILE.py:NAME"
+        )
 
 
 @dataclass(frozen=True)
@@ -57,9 +81,16 @@ class Law:
     """A constitutive law.
 
     ``coefficients(nu, room, e, slope)`` takes nu and ``room`` = 1 - nu/nu* apart, so that no digit is lost
-    near the densest packing nu* = ``densest``, where the radial distribution function diverges.
+    near the densest packing nu* = ``densest``, where the radial distribution function diverges. It is a plain
+    function, or a frozen dataclass whose fields are the parameters of the law, see
+    :class:`chuteflow.theory.formula.Formula`: laws with equal values of them are equal.
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
-    is a function of nu and the slope.
+    is a function of nu and the slope. ``breaks`` are the volume fractions at which a coefficient is not smooth, or
+    a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
+    the text by which it was asked for, where that was not its name, see :mod:`chuteflow.theory.laws`.
+
+    ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, rate)``, the
+    coefficients where the shear rate over nu sqrt(T) is ``rate``, for disturbed flows of a law that ``knows_slope``.
     """
 
     name: str
@@ -68,6 +99,88 @@ class Law:
     densest: float
     coefficients: Callable[[Field, Field, float, float], Coefficients]
     knows_slope: bool = False
+    breaks: tuple[float, ...] | Callable[[float, float], tuple[float, ...]] = ()
+    valid: str = ""
+    spec: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return self.spec or self.name
+
+    @property
+    def known(self) -> bool:
+        """Whether its function is at hand."""
+        return not isinstance(self.coefficients, Unknown)
+
+    @property
+    def dense_limit(self) -> float:
+        """The volume fraction up to which the law is meant."""
+        return getattr(self.coefficients, "dense_limit", CLUSTERED)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its coefficients are smooth at every density, restitution and slope."""
+        return not self.breaks and getattr(self.coefficients, "smooth", True)
+
+    @classmethod
+    def of(cls, name: str, description: str, source: str, formula: Any, valid: str = "") -> Law:
+        """The law of a ``formula``, a dataclass of parameters that also has ``densest`` and ``breaks``."""
+        knows_slope = hasattr(formula, "at_shear")
+        return cls(name, description, source, formula.densest, formula, knows_slope, valid=valid)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters by name; none where the law is a plain function."""
+        formula: Any = self.coefficients
+        return {field.name: getattr(formula, field.name) for field in fields(formula)} if is_dataclass(formula) else {}
+
+    def configured(self, **settings: Any) -> Law:
+        """The law with other values of some of its parameters.
+
+        Raises:
+            InputError: for a parameter that it does not have, or a value out of range.
+        """
+        for name in settings:
+            if name not in self.parameters:
+                known = ", ".join(self.parameters) or "it has none"
+                raise InputError(f"closure {self.name!r} has no parameter {name!r}: choose from {known}")
+        if not settings:
+            return self
+        formula: Any = replace(cast(Any, self.coefficients), **settings)
+        said = ",".join(f"{name}={value}" for name, value in settings.items())
+        spec = f"{self},{said}" if "=" in str(self).rpartition(":")[2] else f"{self}:{said}"
+        return replace(Law.of(self.name, self.description, self.source, formula, self.valid), spec=spec)
+
+    def breaks_at(self, e: float, slope: float) -> tuple[float, ...]:
+        """The volume fractions, ascending, at which a coefficient is not smooth at this restitution and slope.
+
+        Raises:
+            InputError: for one that is not between 0 and the densest packing.
+        """
+        own: Any = getattr(self.coefficients, "breaks", self.breaks)
+        places: Any = own(e, slope) if callable(own) else own
+        for nu in places:
+            if not 0.0 < nu < self.densest:
+                raise InputError(
+                    f"closure {self.name!r} has a break at nu = {nu:g}: must be above 0 and below {self.densest:g}"
+                )
+        return tuple(sorted(places))
+
+    def at(self, x: Field, e: float, slope: float) -> tuple[Field, Field, Coefficients]:
+        """nu, 1 - nu/nu* and the coefficients at x = nu/(1 - nu/nu*).
+
+        Raises:
+            InputError: where the law's function fails, naming it and the densities.
+        """
+        room = 1.0 / (1.0 + x / self.densest)
+        nu = x * room
+        try:
+            found = self.coefficients(nu, room, e, slope)
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a law of the user may raise anything
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"closure {self}: its function fails at {_where(nu, e)}: {said}") from None
+        return nu, room, found
 
 
 @dataclass(frozen=True)
@@ -75,69 +188,137 @@ class Reduced:
     """What the steady problem needs of a law: functions of nu that are finite at nu = 0, arrays of one shape.
 
     - ``conduction`` = g3 nu/g1, with which y = conduction dtheta/dp;
-    - ``coupling`` = g4/g3, with theta = ln T - Gamma and dGamma/dnu = coupling;
+    - ``drift`` = nu g4/g3, with theta = ln T - Gamma and dGamma/dln nu = drift; where dilute it is -b, and b is 0 but
+      for laws whose g4 grows like 1/nu; ``coupling`` = (drift + b)/nu;
     - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
     - ``grip`` = A g1/g2, of the slip condition (3.16);
-    - ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
+    - ``radial`` = g0, ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
     """
 
     conduction: Field
+    drift: Field
     coupling: Field
     loss: Field
     work: Field
     shear: Field
     grip: Field
+    radial: Field
     compressibility: Field
     stiffness: Field
 
 
 def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
     """Combine the coefficients of ``law`` at x = nu/(1 - nu/nu*) >= 0 into :class:`Reduced`."""
-    room = 1.0 / (1.0 + x / law.densest)
-    nu = x * room
-    g = law.coefficients(nu, room, e, slope)
+    nu, _, g = law.at(x, e, slope)
     big_g = g.compressibility
+    if g.density_flux is None:
+        coupling = g.density_conductivity / g.conductivity
+        drift = coupling * nu
+    else:
+        drift = g.density_flux / g.conductivity
+        empty = nu == 0.0
+        coupling = np.where(empty, 0.0, (drift + dilute_drift(law, e, slope)) / np.where(empty, 1.0, nu))
     # A g1 with (2.12): nu A is finite at nu = 0, where A alone is not.
     nu_contact = nu * (1.0 + WALL_CONTACT) + WALL_CONTACT * 5.0 / (8.0 * g.radial)
     return Reduced(
         conduction=g.conductivity / big_g,
-        coupling=g.density_conductivity / g.conductivity,
+        drift=drift,
+        coupling=coupling,
         loss=g.dissipation / big_g,
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
         grip=big_g * nu_contact / g.viscosity,
+        radial=g.radial,
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
     )
 
 
+def dilute_drift(law: Law, e: float, slope: float) -> Any:
+    """b, the limit of -nu g4/g3 where dilute, for one e or many: 0 but for laws whose g4 grows like 1/nu."""
+    _, _, g = law.at(np.zeros(1), e, slope)
+    if g.density_flux is None:
+        return 0.0
+    b = -g.density_flux / g.conductivity
+    return b if np.ndim(e) else b[0]
+
+
+def require_limit(law: Law, e: float, slope: float, what: str) -> None:
+    """Check that the temperature has a limit far above.
+
+    Raises:
+        InputError: where it grows without bound as the density vanishes; ``what`` needs the limit.
+    """
+    b = dilute_drift(law, e, slope)
+    if b != 0.0:
+        raise InputError(
+            f"closure {law}: T goes like p^({-b / (1.0 - b):.3g}) far above and has no limit there, which {what}: "
+            "take the Fourier form of the closure"
+        )
+
+
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
     x = np.array([0.0, 0.3, 3.0])
-    room = 1.0 / (1.0 + x / law.densest)
-    g = law.coefficients(x * room, room, e, slope)
-    values = [getattr(g, field.name) for field in fields(g)]
-    return [law.densest, *np.concatenate([np.broadcast_to(value, x.shape) for value in values]).tolist()]
+    _, _, g = law.at(x, e, slope)
+    # nu g4 is told by g4.
+    values = [getattr(g, name) for name in FUNCTIONS]
+    found = np.concatenate([np.broadcast_to(value, x.shape) for value in values])
+    return [law.densest, *np.where(np.isfinite(found), found, 0.0).tolist()]
+
+
+def digest(law: Law, e: float, slope: float) -> str:
+    """What tells the values of ``law`` from those of another, to 9 digits, whatever its name."""
+    rounded = [f"{value:.9e}" for value in fingerprint(law, e, slope)]
+    return hashlib.sha256(" ".join(rounded).encode()).hexdigest()
+
+
+#: The functions of a law, by the fields of :class:`Coefficients`, and whether each must be positive.
+FUNCTIONS = {
+    "radial": ("g0", True),
+    "compressibility": ("g1/nu", True),
+    "compressibility_slope": ("d(g1/nu)/dnu", False),
+    "viscosity": ("g2", True),
+    "conductivity": ("g3", True),
+    "density_conductivity": ("g4", False),
+    "dissipation": ("g5/nu^2", False),
+    "bulk_viscosity": ("g6", False),
+}
+_TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
 
 
 def require_positive(law: Law, e: float, slope: float) -> None:
-    """Check that pressure, viscosity and conductivity stay positive at every density.
+    """Check that a law gives numbers at every density, and that pressure, viscosity and conductivity are positive.
 
     Raises:
-        InputError: where ``law`` loses its meaning at restitution ``e``.
+        InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
-    x = np.append(0.0, np.logspace(-4.0, 9.0, 261))
-    room = 1.0 / (1.0 + x / law.densest)
-    g = law.coefficients(x * room, room, e, slope)
-    checks = {
-        "g1": g.compressibility,
-        "g2": g.viscosity,
-        "g3": g.conductivity,
-    }
-    for what, values in checks.items():
-        if not np.all(np.isfinite(values)) or np.min(values) <= 0.0:
+    nu, _, g = law.at(_TRIED, e, slope)
+    if not isinstance(g, Coefficients):
+        raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")
+    for name, (symbol, positive) in FUNCTIONS.items():
+        try:
+            values = np.broadcast_to(np.asarray(getattr(g, name), dtype=float), nu.shape)
+        except (TypeError, ValueError):
+            shape = np.shape(getattr(g, name))
             raise InputError(
-                f"closure {law.name!r} has no positive {what} at restitution e = {e}: "
+                f"closure {law}: {symbol} ({name}) has the shape {shape} for nu of the shape {nu.shape}: "
+                "must be the same"
+            ) from None
+        bad = ~np.isfinite(values) | ((values <= 0.0) if positive else (name == "dissipation") & (values < 0.0))
+        # A flux along the density gradient may grow like 1/nu where dilute.
+        bad[0] &= name != "density_conductivity"
+        if bad.any():
+            at = int(np.argmax(bad))
+            what = f"no positive {symbol}" if positive else f"no {symbol} that makes sense"
+            raise InputError(
+                f"closure {str(law)!r} has {what} at restitution e = {e}: it is {values[at]:g} at nu = {nu[at]:.6g}; "
                 "take a larger e or another closure"
             )
+    law.breaks_at(e, slope)
+
+
+def _where(nu: Field, e: float) -> str:
+    low, high = float(np.min(np.real(nu))), float(np.max(np.real(nu)))
+    return f"nu = {low:.6g}, e = {e}" if low == high else f"nu from {low:.6g} to {high:.6g}, e = {e}"

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
+from chuteflow.numerics.roots import bisected
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Law, reduce
 
@@ -63,14 +64,14 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     Raises:
         InputError: where the law has none, that is no finite and positive conductivity and viscosity.
     """
-    limit = law.coefficients(np.zeros(1), np.ones(1), e, slope)
-    grip = reduce(law, np.zeros(1), e, slope).grip
+    _, _, limit = law.at(np.zeros(1), e, slope)
     g20, g30, g40, g52 = (
         float(value[0])
         for value in (limit.viscosity, limit.conductivity, limit.density_conductivity, limit.dissipation)
     )
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
+    grip = reduce(law, np.zeros(1), e, slope).grip
     return Dilute(g20, g30, g40, g52, float(grip[0]) * g20)
 
 
@@ -366,7 +367,7 @@ def hot_solution(lambda_: float) -> HotSolution:
     """
     if not (math.isfinite(lambda_) and lambda_ < LAMBDA_C and lambda_ != 0.0):
         raise InputError(f"lambda = {lambda_}: hot flows have a lambda below 3, other than 0")
-    return HotSolution(lambda_, _root(*_base_condition(lambda_)))
+    return HotSolution(lambda_, bisected(*_base_condition(lambda_)))
 
 
 def _base_condition(lambda_: float) -> tuple[Callable[[float], float], float, float]:
@@ -405,16 +406,7 @@ def _inversion() -> float:
     """x at which 2 x I_1(x)/I_0(x) = 1."""
     from scipy.special import i0e, i1e
 
-    return _root(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
-
-
-def _root(rising: Callable[[float], float], low: float, high: float) -> float:
-    """Root of a rising function, by bisection: scipy.optimize would take longer to import than this takes."""
-    while True:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            return middle
-        low, high = (low, middle) if rising(middle) > 0.0 else (middle, high)
+    return bisected(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
 
 
 def _c0(y: Field, sign: float) -> Field:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from chuteflow.theory.constitutive import Coefficients, Field, Law
+from chuteflow.theory.formula import Formula
 
 #: Densest packing nu* of the radial distribution function, table 1.
 DENSEST = 0.62
@@ -14,10 +15,26 @@ DENSEST = 0.62
 _ROOT_PI = float(np.sqrt(np.pi))
 
 
-def lun(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
-    """Table 1 as the paper has it. ``slope`` does not enter."""
-    del slope
-    return table_1(nu, room ** (-2.5 * DENSEST), 2.5 / room, e)
+@dataclass(frozen=True)
+class Lun(Formula):
+    """The laws of table 1.
+
+    Args:
+        fourier: leave the heat flux along the density gradient away (g4 = 0, the paper's appendix), for which T
+            comes to T_inf as in (A2), and not as in (A1).
+    """
+
+    fourier: bool = False
+
+    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+        """Table 1 as the paper has it; ``slope`` does not enter."""
+        del slope
+        full = table_1(nu, *self.radial_at(nu, room), e)
+        if self.friction:
+            full = replace(full, dissipation=12.0 / _ROOT_PI * (1.0 - self.loss_restitution(e) ** 2) * full.radial)
+        if self.fourier:
+            full = replace(full, density_conductivity=np.zeros_like(full.density_conductivity))
+        return full
 
 
 def table_1(nu: Field, g0: Field, log_slope: Field, e: float) -> Coefficients:
@@ -51,24 +68,20 @@ def table_1(nu: Field, g0: Field, log_slope: Field, e: float) -> Coefficients:
     )
 
 
-def lun_fourier(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
-    """Table 1 with g4 = 0 (the paper's appendix), for which T comes to T_inf as in (A2), and not as in (A1)."""
-    full = lun(nu, room, e, slope)
-    return replace(full, density_conductivity=np.zeros_like(full.density_conductivity))
+_VALID = "nearly elastic grains; nu below 0.49"
 
-
-LUN = Law(
-    name="lun",
-    description="kinetic theory of inelastic spheres, heat flux along temperature and density gradients",
-    source="Lun et al. 1984; table 1",
-    densest=DENSEST,
-    coefficients=lun,
+LUN = Law.of(
+    "lun",
+    "kinetic theory of inelastic spheres, heat flux along temperature and density gradients",
+    "Lun et al. 1984; table 1",
+    Lun(),
+    valid=_VALID,
 )
 
-LUN_FOURIER = Law(
-    name="lun-fourier",
-    description="the same with Fourier's heat flux alone (g4 = 0)",
-    source="the paper's appendix",
-    densest=DENSEST,
-    coefficients=lun_fourier,
+LUN_FOURIER = Law.of(
+    "lun-fourier",
+    "the same with Fourier's heat flux alone (g4 = 0)",
+    "the paper's appendix",
+    Lun(fourier=True),
+    valid=_VALID,
 )

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from chuteflow.errors import InputError
-from chuteflow.numerics.first_order import Field, apply, exp
+from chuteflow.numerics.first_order import Field, apply, apply_two, exp
 from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import WALL_CONTACT, Law
+from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law, require_limit
 
 #: A field of the caller's kind of number.
 Number = Any
@@ -51,11 +51,12 @@ class Grains:
     slope: float
 
     def __post_init__(self) -> None:
-        if self.law.knows_slope:
+        if self.law.knows_slope and not hasattr(self.law.coefficients, "at_shear"):
             raise InputError(
                 f"closure {self.law.name!r} knows the shear rate by the slope alone, which holds in steady flows: "
                 "take another closure for disturbed ones"
             )
+        require_limit(self.law, self.restitution, self.slope, "the conditions of disturbed flows need")
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,9 @@ def motion(fields: Fields, gradient: Gradient, grains: Grains) -> Motion:
     """Everything in (2.1)-(2.7) for ``fields``."""
     nu, T = exp(fields.log_density), exp(fields.log_temperature)
     root_T = exp(0.5 * fields.log_temperature)
-    radial, g1, g2, g3, g4, g5, g6 = closures(grains, nu)
     grad_log_nu, grad_log_T = gradient(fields.log_density), gradient(fields.log_temperature)
     grad_u: Tensor = tuple(gradient(component) for component in fields.velocity)  # pyright: ignore[reportAssignmentType]
+    radial, g1, g2, g3, g4, g5, g6 = closures(grains, nu, lambda: shear_rate(grad_u) / (nu * root_T))
     P = pressure_tensor(g1 * T, g2 * root_T, g6 * root_T, grad_u)
     # (2.5), with grad T = T grad ln T
     K, K_star = g3 * root_T * T, g4 * nu * root_T * T
@@ -110,24 +111,41 @@ def motion(fields: Fields, gradient: Gradient, grains: Grains) -> Motion:
     )
 
 
-def closures(grains: Grains, nu: Number) -> list[Number]:
-    """g0 to g6 of table 1 at ``nu``, in the order radial, g1, g2, g3, g4, g5, g6."""
+def closures(grains: Grains, nu: Number, rate: Callable[[], Number]) -> list[Number]:
+    """g0 to g6 of table 1 at ``nu``, in the order radial, g1, g2, g3, g4, g5, g6.
 
-    def table(nu: Field) -> Field:
-        g = grains.law.coefficients(nu, 1.0 - nu / grains.law.densest, grains.restitution, grains.slope)
-        return np.stack(
-            [
-                g.radial,
-                nu * g.compressibility,
-                g.viscosity,
-                g.conductivity,
-                g.density_conductivity,
-                nu**2 * g.dissipation,
-                g.bulk_viscosity,
-            ]
-        )
+    ``rate`` gives the shear rate over nu sqrt(T); it is asked for where the dissipation of the law depends on it.
+    """
+    law, e = grains.law, grains.restitution
+    if law.knows_slope:
+        at_shear: Any = law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
+        return apply_two(lambda nu, rate: _table(nu, at_shear(nu, 1.0 - nu / law.densest, e, rate)), nu, rate())
+    return apply(lambda nu: _table(nu, law.coefficients(nu, 1.0 - nu / law.densest, e, grains.slope)), nu)
 
-    return apply(table, nu)
+
+def _table(nu: Field, g: Coefficients) -> Field:
+    return np.stack(
+        [
+            g.radial,
+            nu * g.compressibility,
+            g.viscosity,
+            g.conductivity,
+            g.density_conductivity,
+            nu**2 * g.dissipation,
+            g.bulk_viscosity,
+        ]
+    )
+
+
+def shear_rate(grad_u: Tensor) -> Number:
+    """sqrt(2 D : D) with the deviatoric strain rate D, which is |du/dz| in simple shear."""
+    third = _sum(grad_u[i][i] for i in AXES) * (1.0 / 3.0)
+    diagonal = _sum((grad_u[i][i] - third) * (grad_u[i][i] - third) for i in AXES) * 2.0
+    square = diagonal + _sum(
+        (grad_u[i][j] + grad_u[j][i]) * (grad_u[i][j] + grad_u[j][i]) for i in AXES for j in AXES if i < j
+    )
+    (root,) = apply(lambda value: np.sqrt(value)[None], square)
+    return root
 
 
 def pressure_tensor(p: Number, eta: Number, xi: Number, grad_u: Tensor) -> Tensor:

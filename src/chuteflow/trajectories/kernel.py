@@ -3,7 +3,8 @@
 # notation: P overburden, p = P + p_S normal stress, L, y, a, k, net, b as in chuteflow.trajectories.tables;
 # A = (1 - k)/(2 a), c = 1 + k/2; B = y - b the residual of the base condition; tau = ln P + P/p_1 the step variable.
 
-With these, dL/dp = 1/p - y/a and dy/dp = net - A y^2 - c y/p. All arrays of a row are in the order of the curve.
+With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0
+for most laws. All arrays of a row are in the order of the curve.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from chuteflow.trajectories.tables import (
     BASE_ABOVE,
     BASE_HIGH,
     BASE_LOW,
+    BETA,
     COUPLED,
     CURVE_ABOVE,
     CURVE_HIGH,
@@ -43,7 +45,7 @@ S_L, S_Y, S_T, S_H, S_G = range(5)
 #: Kinds of invariant regions; in the first B > 0, in the others B < 0.
 FREE, HOT, LOW_FLUX, COLD = range(4)
 #: Below this L nothing changes with the density, and distances count less.
-_DILUTE, _DILUTE_WEIGHT = -7.0, 0.1
+DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 #: States are no longer advanced where y is below this multiple of the scale of fluxes, or L above this.
 _COLDEST, _DENSEST = -8.0, 55.0
 #: Places between two states at which the residual is looked at.
@@ -73,7 +75,7 @@ def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, f
     inverse = values[i, INVERSE] + t * (values[i + 1, INVERSE] - values[i, INVERSE])
     k = values[i, COUPLED] + t * (values[i + 1, COUPLED] - values[i, COUPLED])
     net = values[i, NET] + t * (values[i + 1, NET] - values[i, NET])
-    v = p * y * inverse
+    v = p * y * inverse - values[0, BETA]
     return (1.0 - v) / p, net - y * (1.0 + 0.5 * (v + k * (1.0 - v))) / p
 
 
@@ -133,14 +135,17 @@ def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, rows: Any, 
 def _start(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, rows: Any, j: int) -> None:
     """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
-        half = 0.5 * values[0, NET]
-        big_l = math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
-        v = over**2 * half * look_up(values, big_l, INVERSE)
+        beta = values[0, BETA]
+        half = values[0, NET] / (2.0 - 0.5 * beta)
+        big_l = (1.0 + beta) * math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
+        v = over**2 * half * look_up(values, big_l, INVERSE) - beta
         net, k = look_up(values, big_l, NET), look_up(values, big_l, COUPLED)
-        rows[j, S_Y] = over * (half + (net - 2.0 * half) / 3.0 - half * (v + k * (1.0 - v)) / 6.0)
-        fraction = 1.0
+        share = 3.0 + 0.5 * beta
+        heating = v + k * (1.0 - v) + beta
+        rows[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
+        fraction = 1.0 / (1.0 - beta)
     else:
-        big_l = math.log(p_s) - theta_s
+        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
         l_p, y_p = _derivative(values, p_s, big_l, y_s)
         big_l += over * l_p
         rows[j, S_Y] = y_s + over * y_p
@@ -178,7 +183,7 @@ def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
 @compiled
 def _place(big_l: float) -> float:
     """L as distances count it."""
-    return big_l if big_l > _DILUTE else _DILUTE + _DILUTE_WEIGHT * (big_l - _DILUTE)
+    return big_l if big_l > DILUTE else DILUTE + DILUTE_WEIGHT * (big_l - DILUTE)
 
 
 @compiled
@@ -265,8 +270,8 @@ def _grown(array: Any, size: int) -> Any:
 
 @compiled
 def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
-    """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to join
-    neighbours the one with the shorter lines."""
+    """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to
+    join neighbours the one with the shorter lines."""
     even = odd = 0.0
     for c in range(count):
         d = c + 1 if c + 1 < count else 0
@@ -302,8 +307,9 @@ def carry(
     """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending.
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
-    where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row (R + 1,),
-    the first states of the cells that could not be decided (U,), how many cells were looked at, and how the curve ended.
+    where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row
+    (R + 1,), the first states of the cells that could not be decided (U,), how many cells were looked at, and how the
+    curve ended.
     """
     n = len(log_t)
     states = np.empty((64 * n + 1024, 5))
@@ -340,7 +346,8 @@ def carry(
         half_tau = _lengths(slope, p_s, p_1, overburden[row - 1], over, lengths) if row > 0 else 0.0
         for j in range(n):
             if row == 0 or in_series[j]:
-                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(theta[j]), start_at_most))
+                warmth = theta[j] / (1.0 + values[0, BETA])
+                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(warmth), start_at_most))
                 if row == 0 or in_series[j]:
                     _start(values, slope, p_s, y_s, theta[j], over, rows, j)
                     continue
@@ -598,15 +605,15 @@ def trace_back(states: Any, came_from: Any, place: float, row: int) -> Any:
 
 @compiled
 def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
-    """Bounds of the least and the largest net loss, and of the largest p y/a, of each trajectory down to each state:
-    lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a trajectory
-    lies between its neighbours, and its extrema between theirs."""
+    """Bounds of the least and the largest net loss, and of the largest 1 - p dL/dp, of each trajectory down to each
+    state: lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a
+    trajectory lies between its neighbours, and its extrema between theirs."""
     out = np.empty((len(states), 6))
     for row in range(len(overburden)):
         p = overburden[row] + p_s
         for i in range(first[row], first[row + 1]):
             net = look_up(values, states[i, S_L], NET)
-            turn = p * states[i, S_Y] * look_up(values, states[i, S_L], INVERSE)
+            turn = p * states[i, S_Y] * look_up(values, states[i, S_L], INVERSE) - values[0, BETA]
             out[i, 0] = out[i, 1] = out[i, 3] = out[i, 4] = net
             out[i, 2] = out[i, 5] = turn
             if row > 0:
@@ -621,14 +628,15 @@ def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: A
 
 @compiled
 def extremes_back(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, rows: Any) -> Any:
-    """The least and the largest net loss, and the largest p y/a, down to ``places`` (k,) in ``rows``, (k, 3)."""
+    """The least and the largest net loss, and the largest 1 - p dL/dp, down to ``places`` (k,) in ``rows``, (k, 3)."""
     out = np.empty((len(places), 3))
     for k in range(len(places)):
         back = trace_back(states, came_from, places[k], rows[k])
         out[k, 0], out[k, 1], out[k, 2] = np.inf, -np.inf, -np.inf
         for row in range(rows[k] + 1):
             net = look_up(values, back[row, 0], NET)
-            turn = (overburden[row] + p_s) * back[row, 1] * look_up(values, back[row, 0], INVERSE)
+            p = overburden[row] + p_s
+            turn = p * back[row, 1] * look_up(values, back[row, 0], INVERSE) - values[0, BETA]
             out[k, 0] = min(out[k, 0], net)
             out[k, 1] = max(out[k, 1], net)
             out[k, 2] = max(out[k, 2], turn)

@@ -86,12 +86,12 @@ class TrajectoryGrid:
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
     curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
     row before, between two states where it was inserted; ``goes_on`` (N,) tells whether the curve goes on to the next
-    state. ``values`` (entries, 6) are the functions of L by which they go, and ``scale`` the size of heat fluxes. They
-    serve every base between those that they were refined for: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3) are the two states between which B vanishes,
-    and the fraction of the way. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the
-    first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or
-    they are too long.
-    ``complete`` tells whether the curve was carried to the last depth.
+    state. ``values`` (entries, 7) are the functions of L by which they go, and ``scale`` the size of heat fluxes. They
+    serve every base between those for which parts were kept: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3)
+    are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2) are their neighbours
+    along the branches. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the first
+    states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or they are
+    too long. ``complete`` tells whether the curve was carried to the last depth.
     """
 
     model: Model
@@ -128,15 +128,15 @@ class TrajectoryGrid:
     @cached_property
     def macroscopic(self) -> Array:
         """ln Q, ln h, ln M, ln T_surface at the zeros, (Z, 4)."""
-        values = self._quantities(self.zeros[:, :2].astype(np.int64))
+        values = self.quantities(self.zeros[:, :2].astype(np.int64))
         return values[:, 0] + self.zeros[:, 2:] * (values[:, 1] - values[:, 0])
 
     @cached_property
     def hidden(self) -> Array:
         """ln Q, ln h, ln M, ln T_surface of the flows that undecided cells may hide, roughly, (U, 4)."""
-        return self._quantities(self.undecided)
+        return self.quantities(self.undecided)
 
-    def _quantities(self, places: Index) -> Array:
+    def quantities(self, places: Index) -> Array:
         """ln Q, ln h, ln M, ln T_surface of flows that had their base at states, (..., 4)."""
         model, state = self.model, self.states[places]
         over = self.overburden[self.rows_of(places)]
@@ -172,7 +172,7 @@ class TrajectoryGrid:
         log_mass, log_t = self.macroscopic[zero, 2:]
         mass, temperature = float(np.exp(log_mass)), float(np.exp(log_t))
         over = self.overburden[: len(back)]
-        theta = np.log(over + model.surface_stress) - back[:, 0]
+        theta = (1.0 + model.beta) * np.log(over + model.surface_stress) - back[:, 0]
         per_mass = (back[:, 1] - model.surface_flux) / over
         log_over = np.log(over)
         stretch = default_stretch(model, mass, temperature)
@@ -218,7 +218,8 @@ def carry_down_for(
         bounds = bounds_for(model, np.concatenate([t.values[:, BASE, None], others], axis=1))
         scale = max(scale, float(np.abs(others).max()))
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
-    overburden = _depths(model, t, float(temperature[0]), deepest, p_1, refinement.step)
+    coldest = float(temperature[0]) ** (1.0 / (1.0 + model.beta))
+    overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
     states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),

@@ -13,9 +13,9 @@ def surface_potential(model: Model, temperature: Array) -> Array:
     theta = np.log(temperature)
     if model.surface_stress == 0.0:
         return theta
-    target = theta
+    target = theta = theta + model.beta * np.log(model.surface_stress)
     for _ in range(50):
-        f, df = model.closures(model.surface_stress * np.exp(-theta))
+        f, df = model.closures(model.density_argument(np.full_like(theta, model.surface_stress), theta))
         step = (target - theta - f[GAMMA]) / (1.0 - df[GAMMA])
         theta = theta + step
         if np.abs(step).max() < 1e-12:

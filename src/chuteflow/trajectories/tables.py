@@ -17,8 +17,9 @@ from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, W
 
 #: The table runs over LOW <= ln x <= LOW + (ENTRIES - 1)/PER_UNIT; outside, the functions are constant.
 LOW, PER_UNIT, ENTRIES = -25.0, 48.0, 4096
-#: Columns of a table: 1/a, k, net, b, and what the heights and velocities are integrals of: x/nu, work exp(Gamma/2).
-INVERSE, COUPLED, NET, BASE, HEIGHT, SHEARING = range(6)
+#: Columns of a table: 1/a, k, net, b; what the heights and velocities are integrals of, x/nu and work exp(Gamma/2); and
+#: beta, the same in all rows.
+INVERSE, COUPLED, NET, BASE, HEIGHT, SHEARING, BETA = range(7)
 #: Columns of the bounds: see :class:`Tables`.
 (
     NET_LOW, NET_HIGH, CURVE_LOW, CURVE_HIGH, RELAX_HIGH, SPREAD, BASE_LOW, BASE_HIGH,
@@ -30,9 +31,10 @@ INVERSE, COUPLED, NET, BASE, HEIGHT, SHEARING = range(6)
 class Tables:
     """What the trajectories of one model need.
 
-    ``values`` (entries, 6) are the functions; ``bounds`` (entries, 12) are extrema of them over all smaller L (net
-    from both sides, A = (1 - k)/(2 a) from both sides, the largest 1 + k/2, the largest a, b from both sides) and
-    over all larger L (the largest net, the smallest A, the largest 1 + k/2, the smallest b). ``rate`` is the fastest
+    ``values`` (entries, 7) are the functions; ``bounds`` (entries, 12) are extrema of them over all smaller L (net
+    from both sides, A = (1 - k)/(2 a) from both sides, the largest c = 1 + ((1 + beta) k - beta)/2, the largest
+    (1 + beta) a, b from both sides) and over all larger L (the largest net, the smallest A, the largest c, the
+    smallest b). ``rate`` is the fastest
     rate of y in p, and ``scale`` the size of heat fluxes y.
     """
 
@@ -57,14 +59,15 @@ def tables(model: Model) -> Tables:
     net = f[LOSS] - model.slope**2 * f[WORK]
     base = model.base_flux(f)
     height, shearing = np.exp(-f[DENSITY]), f[WORK] * np.exp(0.5 * f[GAMMA])
-    values = np.stack([1.0 / conduction, coupling, net, base, height, shearing], axis=1)
+    columns = [1.0 / conduction, coupling, net, base, height, shearing, np.full_like(net, model.beta)]
+    values = np.stack(columns, axis=1)
     curve = 0.5 * (1.0 - coupling) / conduction
-    relax = 1.0 + 0.5 * coupling
+    relax = 1.0 + 0.5 * (coupling * (1.0 + model.beta) - model.beta)
     lowest, highest = np.minimum.accumulate, np.maximum.accumulate
     bounds = np.stack(
         [
-            lowest(net), highest(net), lowest(curve), highest(curve), highest(relax), highest(conduction),
-            lowest(base), highest(base),
+            lowest(net), highest(net), lowest(curve), highest(curve), highest(relax),
+            highest(conduction) * (1.0 + model.beta), lowest(base), highest(base),
             highest(net[::-1])[::-1], lowest(curve[::-1])[::-1], highest(relax[::-1])[::-1], lowest(base[::-1])[::-1],
         ],
         axis=1,

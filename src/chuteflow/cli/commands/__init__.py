@@ -8,6 +8,8 @@ COMMANDS = {
     "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
     "sweep": "The flows of very many chutes, as a study says, into a Zarr store.",
+    "closures": "The constitutive laws that there are, their parameters, and the functions of one of them.",
+    "compare-closures": "The flows of one chute under several constitutive laws, side by side.",
     "figures": "Draw figures of the paper.",
     "claims": "Compute every statement of the paper that can be tested, with a verdict on each.",
     "report": "One page with every figure and claim of the paper, recomputed, and verdicts.",

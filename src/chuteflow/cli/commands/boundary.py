@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.quantities import NUMBERS, PLACE
@@ -54,7 +54,7 @@ class Plane(click.ParamType):
 @options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
 @options.range_options("where it is the second parameter")
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options
 @options.output_options
@@ -66,10 +66,15 @@ def command(**given: Any) -> None:
     from chuteflow.bifurcations.boundary import boundary
 
     chosen = {name: given[option] for name, option in (("of", "of"), ("samples", "samples")) if given[option]}
-    found = boundary(
-        chute, second=BY_KEY[second].name, bounds=bounds, progress=_progress, **chosen, **options.search(given)
-    )
-    _clear()
+    with Progress() as progress:
+        found = boundary(
+            chute,
+            second=BY_KEY[second].name,
+            bounds=bounds,
+            progress=lambda what, share: progress.tell(f"{what}, {share:.0%} of the range"),
+            **chosen,
+            **options.search(given),
+        )
     if given["as_json"]:
         from chuteflow.io import contract
         from chuteflow.io.boundary_records import boundaries_object
@@ -84,9 +89,10 @@ def command(**given: Any) -> None:
         boundary_records.save(found, path)
 
     def plotted() -> Figure:
-        from chuteflow.plotting.boundary_plot import plot_boundaries
+        from chuteflow.bifurcations.diagram import diagram
+        from chuteflow.plotting.boundary_plot import plot_boundaries, plot_none
 
-        return plot_boundaries(found, _UPRIGHT[upright])
+        return plot_boundaries(diagram(found, _UPRIGHT[upright])) if len(found) else plot_none(found)
 
     options.deliver(given, answer, save, plotted)
 
@@ -110,30 +116,20 @@ def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], 
     return bounds, options.chute({**given, second: bounds[0]})
 
 
-def _progress(what: str, share: float) -> None:
-    if sys.stderr.isatty():
-        click.echo(f"\r\x1b[K{what}, {share:.0%} of the range", nl=False, err=True)
-
-
-def _clear() -> None:
-    if sys.stderr.isatty():
-        click.echo("\r\x1b[K", nl=False, err=True)
-
-
 def _report(found: BoundarySet, second: str) -> Iterator[str]:
     from chuteflow.io import words
 
     yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
     others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
     said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
-    yield f"chute: {said}, surface {found.chute.surface}, closure {found.chute.closure}"
+    yield f"chute: {said}, surface {found.chute.surface}, {found.chute.laws}"
     for i, boundary in enumerate(found, 1):
         yield ""
         yield f"boundary {i} of {len(found)}, {len(boundary.flows)} points"
         yield _points(boundary, second)
     yield ""
     if found.reason:
-        yield f"no boundary: {found.reason}"
+        yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
@@ -142,6 +138,8 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
         "neither come near, could be missed"
     )
+    if found.incomplete:
+        yield f"there may be more: {found.incomplete}"
     if found.skipped:
         yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 

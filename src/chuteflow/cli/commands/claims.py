@@ -1,9 +1,8 @@
-"""``chuteflow claims``: every statement of the paper that can be tested, computed anew, with a verdict."""
+"""``chuteflow claims``: every statement of the paper that can be tested, computed, with a verdict."""
 
 from __future__ import annotations
 
 import shutil
-import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
@@ -14,6 +13,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
@@ -76,13 +76,12 @@ def _chosen(only: str | None, section: str | None) -> list[str]:
 
 def _watched(verdicts: Iterable[Verdict], total: int) -> Iterator[Verdict]:
     """The same, with the progress on standard error if that is a terminal."""
-    seen = sys.stderr.isatty()
-    for number, verdict in enumerate(verdicts, 1):
-        if seen:
-            click.echo("\r\x1b[K", nl=False, err=True)
-        yield verdict
-        if seen and number < total:
-            click.echo(f"{number} of {total} claims", nl=False, err=True)
+    with Progress() as progress:
+        for number, verdict in enumerate(verdicts, 1):
+            progress.clear()
+            yield verdict
+            if number < total:
+                progress.tell(f"{number} of {total} claims")
 
 
 def _json(verdicts: Sequence[Verdict]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def command(**given: Any) -> None:
 
         content = contract.curve_object(found, scales)
         if judged is not None:
-            from chuteflow.plotting.stability_curve import changes_objects, samples_objects
+            from chuteflow.io.stability_curve import changes_objects, samples_objects
 
             objects = samples_objects(judged, scales), changes_objects(judged, scales)
             for branch, samples, changes in zip(content["branches"], *objects, strict=True):
@@ -75,14 +75,9 @@ def command(**given: Any) -> None:
 def _judged(found: Curve, samples: int | None) -> MarkedCurve:
     from chuteflow.stability.along import marked
 
-    def progress(share: float) -> None:
-        if sys.stderr.isatty():
-            click.echo(f"\r\x1b[K{share:.0%} of the flows judged", nl=False, err=True)
-
-    judged = marked(found, progress=progress, **({} if samples is None else {"samples": samples}))
-    if sys.stderr.isatty():
-        click.echo("\r\x1b[K", nl=False, err=True)
-    return judged
+    chosen = {} if samples is None else {"samples": samples}
+    with Progress() as progress:
+        return marked(found, progress=lambda share: progress.tell(f"{share:.0%} of the flows judged"), **chosen)
 
 
 def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> Iterator[str]:
@@ -110,7 +105,7 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
     """Stable and unstable stretches of a family in words."""
-    from chuteflow.plotting.stability_curve import change_words, stretch
+    from chuteflow.io.stability_curve import change_words, stretch
 
     said = [stretch(run, found.chute, scales) for run in branch.runs]
     ends = [change_words(change, found.chute, scales) for change in branch.changes]

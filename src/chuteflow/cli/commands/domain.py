@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.processes import available_cores
@@ -60,7 +60,7 @@ class Numbers(click.ParamType):
     "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )
 @options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.option("--closure", metavar="NAME", help="Constitutive law: lun (the default) or lun-fourier.")
+@options.closure_options
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
 @options.output_options
@@ -78,10 +78,16 @@ def command(**given: Any) -> None:
     workers = given["processes"]
     if workers is None:
         workers = min(available_cores(), _MOST_PROCESSES)
-    try:
-        found = domain(chute, x, y, workers=workers, progress=_progress, **chosen, **options.search(given))
-    finally:
-        _clear()
+    with Progress() as progress:
+        found = domain(
+            chute,
+            x,
+            y,
+            workers=workers,
+            progress=lambda done, known: progress.tell(f"{done} of {known} columns, as far as is known"),
+            **chosen,
+            **options.search(given),
+        )
     if given["as_json"]:
         from chuteflow.io import contract
         from chuteflow.io.domain_records import domain_object
@@ -121,16 +127,6 @@ def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:
     return axes[0], axes[1], options.chute({**given, **{name: low for name, (low, _) in ranges.items()}})
 
 
-def _progress(done: int, known: int) -> None:
-    if sys.stderr.isatty():
-        click.echo(f"\r\x1b[K{done} of {known} columns, as far as is known", nl=False, err=True)
-
-
-def _clear() -> None:
-    if sys.stderr.isatty():
-        click.echo("\r\x1b[K", nl=False, err=True)
-
-
 def _report(found: Domain) -> Iterator[str]:
     from chuteflow.io import tables, words
     from chuteflow.io.contract import SHORT
@@ -147,7 +143,7 @@ def _report(found: Domain) -> Iterator[str]:
         for key, parameter in BY_KEY.items()
         if parameter.name not in (x.name, y.name)
     ]
-    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, closure {plane.chute.closure}"
+    yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, {plane.chute.laws}"
     yield ""
     rows = [["", "value", "share of the plane"]]
     parts = shares(found)

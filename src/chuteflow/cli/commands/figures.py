@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
 from chuteflow.processes import available_cores
@@ -64,21 +64,18 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     for path in names.values():
         require_writable(path, options.DRAWN)
     flows = source(method or METHODS[0], available_cores())
-    watched = sys.stderr.isatty()
     for number, path in names.items():
         begin = time.perf_counter()
-        if watched:
-            click.echo(f"figure {number} ...", nl=False, err=True)
-        data = computed(number, flows)
-        write_figure(drawn(number, data), path)
-        write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))
+        with Progress() as progress:
+            progress.tell(f"figure {number} ...")
+            data = computed(number, flows)
+            write_figure(drawn(number, data), path)
+            write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))
         unchanged = (
             f"; --method changes nothing: {WITHOUT_METHOD[number]}" if method and number in WITHOUT_METHOD else ""
         )
         ends = "; the method does not reach all flows: see the notes in the data" if incomplete(data) else ""
         took = f"{time.perf_counter() - begin:.1f} s"
-        if watched:
-            click.echo("\r\x1b[K", nl=False, err=True)
         click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}{ends}")
 
 

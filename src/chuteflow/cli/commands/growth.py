@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +10,7 @@ import numpy as np
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,8 +69,14 @@ def command(**given: Any) -> None:
     from chuteflow.stability.planes import wave_map
 
     size = {} if given["size"] is None else {"size": given["size"]}
-    mapped = wave_map(flow, kx=given["kx"], ky=given["ky"], progress=progress, **size)
-    clear()
+    with Progress() as progress:
+        mapped = wave_map(
+            flow,
+            kx=given["kx"],
+            ky=given["ky"],
+            progress=lambda share: progress.tell(f"{share:.0%} of the map"),
+            **size,
+        )
     content = wave_object(mapped)
 
     def plotted() -> Figure:
@@ -80,29 +85,13 @@ def command(**given: Any) -> None:
         return plot_wave_map(mapped)
 
     answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
-    options.deliver(given, answer, partial(write, content, wave_rows(mapped)), plotted)
 
+    def save(path: str) -> None:
+        from chuteflow.io.files import write_answer
 
-def write(content: Mapping[str, Any], rows: Iterator[list[str]], path: str) -> None:
-    """Write a map, as ``content`` or as ``rows``, to ``path``."""
-    from chuteflow.io import contract
-    from chuteflow.io.writing import write_whole
+        write_answer(path, lambda: content, lambda: wave_rows(mapped))
 
-    as_json = path.lower().endswith(".json")
-    text = contract.text(content) if as_json else "\n".join(",".join(row) for row in rows)
-    write_whole(path, text + "\n")
-
-
-def progress(share: float) -> None:
-    """How much of the map is done, on a terminal."""
-    if sys.stderr.isatty():
-        click.echo(f"\r\x1b[K{share:.0%} of the map", nl=False, err=True)
-
-
-def clear() -> None:
-    """Take the progress away."""
-    if sys.stderr.isatty():
-        click.echo("\r\x1b[K", nl=False, err=True)
+    options.deliver(given, answer, save, plotted)
 
 
 def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.growth import SAVED, Size, clear, hidden_and_unresolved, progress, write
+from chuteflow.cli.commands.growth import SAVED, Size, hidden_and_unresolved
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,8 +60,13 @@ def command(**given: Any) -> None:
     from chuteflow.stability.planes import family_map
 
     asked = {name: given[option] for name, option in (("depth_wavenumber", "kh"), ("size", "size")) if given[option]}
-    mapped = family_map(traced.branches[0].flows, angle=angle, progress=progress, **asked)
-    clear()
+    with Progress() as progress:
+        mapped = family_map(
+            traced.branches[0].flows,
+            angle=angle,
+            progress=lambda share: progress.tell(f"{share:.0%} of the map"),
+            **asked,
+        )
     content = family_object(mapped)
 
     def plotted() -> Figure:
@@ -70,7 +75,13 @@ def command(**given: Any) -> None:
         return plot_family_map(mapped)
 
     answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
-    options.deliver(given, answer, partial(write, content, family_rows(mapped)), plotted)
+
+    def save(path: str) -> None:
+        from chuteflow.io.files import write_answer
+
+        write_answer(path, lambda: content, lambda: family_rows(mapped))
+
+    options.deliver(given, answer, save, plotted)
 
 
 def _angle(waves: str | None) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 
 #: Rows of the table that is printed; nearness that counts as arrival, if it shrinks, and as rest.
 _ROWS, _ARRIVED, _SETTLED = 12, 0.01, 1e-6
-#: The picture begins at this share of the whole time, on a logarithmic axis.
-_FIRST = 1e-5
 _COLUMNS = {
     "t": "time",
     "Q": "mass_flux",
@@ -102,15 +99,10 @@ def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
     from chuteflow.stability.relaxation import relax
 
     moments: list[Moment] = []
-    shown = time.monotonic()
-    telling = sys.stderr.isatty()
-    for moment in relax(layer, start, duration):
-        moments.append(moment)
-        if telling and time.monotonic() > shown + 1.0:
-            shown = time.monotonic()
-            click.echo(f"\r\x1b[Kt = {moment.time:.6g} of {duration:.6g}", nl=False, err=True)
-    if telling:
-        click.echo("\r\x1b[K", nl=False, err=True)
+    with Progress(seconds=1.0) as progress:
+        for moment in relax(layer, start, duration):
+            moments.append(moment)
+            progress.tell(f"t = {moment.time:.6g} of {duration:.6g}")
     return moments
 
 
@@ -170,37 +162,14 @@ def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
 
 
 def _save(content: dict[str, Any], path: str) -> None:
-    from chuteflow.io import contract
-    from chuteflow.io.writing import write_whole
+    from chuteflow.io.files import write_answer
 
-    if path.lower().endswith(".json"):
-        write_whole(path, contract.text(content) + "\n")
-    else:
-        rows = zip(*(content[symbol] for symbol in _COLUMNS), strict=True)
-        lines = [",".join(_COLUMNS), *(",".join(map(repr, row)) for row in rows)]
-        write_whole(path, "\n".join(lines) + "\n")
+    columns = (content[symbol] for symbol in _COLUMNS)
+    rows = [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
+    write_answer(path, lambda: content, lambda: rows)
 
 
 def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Figure:
-    """Q, h and T at the base against the logarithm of time, and their values in the steady flows."""
-    from matplotlib.lines import Line2D
+    from chuteflow.plotting.relaxation_plot import plot_relaxation
 
-    from chuteflow.plotting import style
-    from chuteflow.plotting.plots import parameters
-
-    figure, axes = style.panels(3, height=3.1)
-    rest = style.Stroke(style.BLACK, style.DOTTED)
-    later = [moment for moment in moments if moment.time > _FIRST * moments[-1].time]
-    for ax, name in zip(axes, ("mass_flux", "centre_of_mass", "base_temperature"), strict=True):
-        ax.plot([m.time for m in later], [getattr(m, name) for m in later], **style.stroke(0).line())
-        for steady in end.steady:
-            ax.axhline(getattr(steady, name), **rest.line(0.8))
-        style.logarithmic(ax, "x")
-        style.name_axes(ax, "time, $t$", style.label(name))
-    key = [
-        Line2D([], [], label="disturbed flow", **style.stroke(0).line()),
-        Line2D([], [], label=f"steady flows of the hold-up $M = {flow.mass_holdup:.4g}$", **rest.line(0.8)),
-    ]
-    style.caption(figure, parameters(flow.chute))
-    style.legend(figure, handles=key, loc="outside lower center", ncols=2)
-    return figure
+    return plot_relaxation(flow, moments, end)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.branches.results import FlowSet
-    from chuteflow.io.stability_records import Answer
+    from chuteflow.stability.answers import Answer
+    from chuteflow.stability.budget import Budget
     from chuteflow.stability.modes import Mode
     from chuteflow.stability.verdict import Stability
     from chuteflow.steady.flow import Flow
@@ -86,7 +87,7 @@ def command(as_json: bool, **given: Any) -> None:
 
 
 def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answer:
-    from chuteflow.io.stability_records import Answer
+    from chuteflow.stability.answers import Answer
     from chuteflow.stability.verdict import leading_modes, stability_of
 
     try:
@@ -102,14 +103,14 @@ def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answe
 
 
 def _save(found: FlowSet, answers: Sequence[Answer], path: str) -> None:
-    from chuteflow.io import contract, stability_records
-    from chuteflow.io.writing import write_whole
+    from chuteflow.io import stability_records
+    from chuteflow.io.files import write_answer
 
-    if path.lower().endswith(".json"):
-        text = contract.text(stability_records.answers_object(found, answers, fields=True))
-    else:
-        text = "\n".join(",".join(row) for row in stability_records.csv_rows(answers))
-    write_whole(path, text + "\n")
+    write_answer(
+        path,
+        lambda: stability_records.answers_object(found, answers, fields=True),
+        lambda: stability_records.csv_rows(answers),
+    )
 
 
 def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:
@@ -127,8 +128,8 @@ def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:
         yield ""
         for i, answer in enumerate(answers, 1):
             yield f"{i}  {words.among(answer.flow, found)}: {_said(answer)}"
-            if answer.modes:
-                yield f"   {_fed(answer.modes[0])}"
+            if answer.budget is not None:
+                yield f"   {_fed(answer.budget)}"
     yield words.searched(found.searched, found.chute, None)
 
 
@@ -152,15 +153,14 @@ def _said(answer: Answer) -> str:
     return _of_all(found) if found.complete else _of_some(found)
 
 
-def _fed(mode: Mode) -> str:
+def _fed(budget: Budget) -> str:
     """What feeds a mode and what it loses most by, of its energy budget."""
     from chuteflow.io.tables import number
-    from chuteflow.stability.budget import energy_budget
 
-    budget = energy_budget(mode)
     terms = sorted(budget.terms, key=lambda term: -term.total)
     told = ", ".join(f"{term.name} {number(term.total)}" for term in (*terms[:2], *terms[-2:]))
-    return f"energy of the mode: {told}, of a growth rate of {number(mode.growth)}; closes to {abs(budget.closure):.0e}"
+    growth = number(budget.mode.growth)
+    return f"energy of the mode: {told}, of a growth rate of {growth}; closes to {abs(budget.closure):.0e}"
 
 
 def _of_all(found: Stability) -> str:

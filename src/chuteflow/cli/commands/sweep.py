@@ -8,7 +8,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ import click
 from chuteflow import __version__
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.processes import available_cores
 
@@ -135,7 +136,7 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
             for line in found.damage_lines():
                 click.echo(f"{line}: computed again", err=True)
             _begin(store, found, computing=len(found.sound) < len(chunks))
-            progress = Progress(len(chunks), len(found.sound))
+            progress = Watch(len(chunks), len(found.sound))
             for marker in run(store, (chunk for chunk in chunks if chunk not in found.sound), workers):
                 progress.add(marker)
                 found.add(marker)
@@ -186,7 +187,8 @@ class Totals:
         self.versions[marker.version] += 1
 
     def __add__(self, other: Totals) -> Totals:
-        return Totals(**{name: value + getattr(other, name) for name, value in vars(self).items()})
+        sums = {one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
+        return Totals(**sums)
 
 
 class _Found:
@@ -223,14 +225,14 @@ class _Found:
             yield f"{len(self.damage) - _MOST_LINES} more chunks are damaged"
 
 
-class Progress:
+class Watch:
     """Lines on standard error: what is done and how long the rest will take."""
 
     def __init__(self, whole: int, done: int) -> None:
         self._whole, self._done = whole, done
         self._begin, self._first, self._told = time.monotonic(), self._done, float("-inf")
         self._points = self._flows = self._failed = 0
-        self._over = sys.stderr.isatty()
+        self._line = Progress()
         if self._done:
             click.echo(f"{self._done} of {self._whole} chunks are done already", err=True)
 
@@ -241,7 +243,7 @@ class Progress:
         self._flows += marker.flows
         self._failed += len(marker.failures)
         now = time.monotonic()
-        if now - self._told >= (_OFTEN if self._over else _SELDOM):
+        if now - self._told >= (_OFTEN if self._line.is_shown else _SELDOM):
             self._told = now
             self._tell(now - self._begin)
 
@@ -249,7 +251,7 @@ class Progress:
         """Tell where it ended."""
         if self._points:
             self._tell(time.monotonic() - self._begin)
-            if self._over:
+            if self._line.is_shown:
                 click.echo(err=True)
 
     def _tell(self, spent: float) -> None:
@@ -258,7 +260,10 @@ class Progress:
             f"chunk {self._done} of {self._whole}: {self._points / max(spent, 1e-9):.0f} points a second, "
             f"{self._flows} flows, {self._failed} points failed, {_time(left)} left"
         )
-        click.echo(f"\r{text}\033[K" if self._over else text, err=True, nl=not self._over)
+        if self._line.is_shown:
+            self._line.tell(text)
+        else:
+            click.echo(text, err=True)
 
 
 def _time(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""The statements of the paper that can be tested, each computed anew and given a verdict.
+"""The statements of the paper that can be tested, each computed here and given a verdict.
 
 ``CLAIMS`` holds them by id; ``check()`` computes them one at a time. A new claim is one decorated function in a module
 of its subject; a new subject is one module here, and one name in the line that imports them, in the order of the paper.

@@ -11,12 +11,12 @@ base gives less than that, and more than nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 
 from chuteflow import Chute
+from chuteflow.numerics.roots import bisected
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import reduce
 from chuteflow.theory.laws import law
@@ -40,12 +40,4 @@ def cold_slope_bounds(chute: Chute) -> tuple[float, float]:
         net = max(float(r.loss[0] - slope**2 * r.work[0]), 0.0)
         return given(slope) - math.sqrt(2.0 * float(r.conduction[0]) * net / (1.0 - k))
 
-    return _root(given), _root(surplus)
-
-
-def _root(rising: Callable[[float], float]) -> float:
-    low, high = 0.0, 10.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if rising(middle) > 0.0 else (middle, high)
-    return high
+    return bisected(given, 0.0, 10.0), bisected(surplus, 0.0, 10.0)

@@ -8,7 +8,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow import Branch, Chute, Curve, Flow, FlowSet, curve, flows
+from chuteflow import Chute, Curve, Flow, FlowSet, curve, flows
+from chuteflow.branches.counting import flows_at_flux
+from chuteflow.branches.lines import in_order
 from chuteflow.paper.materials import dissipative
 from chuteflow.theory.constitutive import Coefficients
 from chuteflow.theory.laws import law
@@ -51,17 +53,7 @@ def curve_of(chute: Chute, coldest: float = 1e-3, points: int = 80) -> Curve:
 
 def all_flows(found: Curve) -> list[Flow]:
     """Every flow of a curve, special points included."""
-    return [flow for branch in found.branches for flow in _in_order(branch)]
-
-
-def _in_order(branch: Branch) -> list[Flow]:
-    """The flows of a branch with its special points in their places."""
-    special = sorted(branch.special, key=lambda point: point.position)
-    flows_in_order: list[Flow] = []
-    for i, flow in enumerate(branch.flows):
-        flows_in_order.append(flow)
-        flows_in_order += [point.flow for point in special if point.position == i]
-    return flows_in_order
+    return [point.flow for branch in found.branches for point in in_order(branch)]
 
 
 def folds(found: Curve) -> list[float]:
@@ -73,12 +65,7 @@ def folds(found: Curve) -> list[float]:
 
 def count(found: Curve, mass_flux: float) -> int:
     """How many flows of a curve have this mass flux."""
-    return sum(_crossings(branch, mass_flux) for branch in found.branches)
-
-
-def _crossings(branch: Branch, mass_flux: float) -> int:
-    above = np.array([flow.mass_flux for flow in _in_order(branch)]) > mass_flux
-    return int(np.count_nonzero(above[1:] != above[:-1]))
+    return flows_at_flux(found.branches, mass_flux)
 
 
 def closures(nu: Array, e: float) -> Coefficients:

@@ -48,14 +48,16 @@ from numpy.typing import ArrayLike
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid
+from chuteflow.numerics.complex_step import STEP, derivative, stepped
 from chuteflow.numerics.newton import newton
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, Profile
+from chuteflow.steady.kinds import density_kind
 from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
 from chuteflow.theory import boundary
+from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
-from chuteflow.theory.laws import law
 
 #: Most coefficients that :func:`refine` takes, less one.
 LARGEST_DEGREE = 400
@@ -65,8 +67,6 @@ DEGREES = (16, 24, 36, 54, 80, 120, 180, 270, LARGEST_DEGREE)
 _RESOLVED, _WASTED = 1e-10, 1e-15
 #: The multiple k is kept along a curve while h/T_inf is within this factor of it.
 _MULTIPLE_OFF = 2.0
-#: Step of the complex-step derivative: exact, since nothing is subtracted.
-_STEP = 1e-30
 #: Least relative error ever claimed.
 _FLOOR = 1e-12
 #: The degree that checks another is larger by this factor.
@@ -230,7 +230,7 @@ class MappedSystem:
 
     def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> Local:
         """Functions of the fields at points; arguments may be complex, for derivatives."""
-        chute, chosen = self.chute, law(self.chute.closure)
+        chute, chosen = self.chute, self.chute.law
         s, kappa = chute.slope, self.kappa
         per_scale = np.exp(-log_scale)
         mass, y2 = x * x, y * y
@@ -275,13 +275,13 @@ class MappedSystem:
         zeta = np.sin(0.5 * np.pi * np.arange(1, self.degree) / self.degree) ** 2
         x, dx, ddx = (_series(a, zeta, order) for order in range(3))
         y, dy, ddy = (_series(b, zeta, order) for order in range(3))
-        step = 1j * _STEP
+        step = 1j * STEP
         omega = self.omega(zeta + step)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             local = self.local(
                 x + step * dx, dx + step * ddx, y + step * dy, dy + step * ddy, np.asarray(log_scale), omega
             )
-            divergence = np.real(omega) * np.imag(omega * local.flux) / (_STEP * self.kappa)
+            divergence = np.real(omega) * derivative(omega * local.flux) / self.kappa
             heating = np.real(local.heating)
             energy = np.abs(divergence - heating).max() / np.abs(heating).max()
             momentum = np.abs(np.real(local.momentum)).max() / np.abs(x).max()
@@ -351,14 +351,14 @@ class _Evaluation:
         variables[4] = log_scale
         self.y_surface = float(variables[2, 0, 0].real)
         for i in range(5):
-            variables[i, i] += 1j * _STEP
+            variables[i, i] = stepped(variables[i, i])
         x, dx, y, dy, log_scales = variables
         self.at = system.local(x, dx, y, dy, log_scales, self.omega)
 
     def both(self, function: Field, rows: slice) -> tuple[Array, Array]:
         """Values (rows,) of a pointwise function, and its derivative (rows, n+1) with respect to z."""
         m, n_x, n_y = self.sampling, self.n_x, self.n_y
-        by_x, by_dx, by_y, by_dy, by_scale = np.imag(function[:, rows]) / _STEP
+        by_x, by_dx, by_y, by_dy, by_scale = derivative(function[:, rows])
         out = np.zeros((len(by_x), n_x + n_y + 2))
         basis, slope = m.basis[rows], m.basis_slope[rows]
         out[:, :n_x] = by_x[:, None] * basis[:, :n_x] + by_dx[:, None] * slope[:, :n_x]
@@ -480,7 +480,7 @@ class MappedSolution:
     @cached_property
     def density(self) -> str:
         """ "inverted" where the volume fraction rises with height anywhere, else "monotonic"."""
-        return "inverted" if self.system.density_excess(self.z) > 0.0 else "monotonic"
+        return density_kind(self.system.density_excess(self.z))
 
     @property
     def map_length(self) -> float:
@@ -638,6 +638,7 @@ def _placed(
     chute: Chute, start: Flow | MappedSolution, degree: int, multiple: int | None
 ) -> tuple[MappedSystem, Array]:
     """The system of ``degree``, and ``start`` on it."""
+    require_richman(chute.base, "the mapped method is")
     if start.chute.surface != chute.surface:
         raise InputError(
             f"the flow to start from has the surface {start.chute.surface!r}: it must be that of the chute, "

@@ -1,0 +1,26 @@
+"""What is known of the stability of one flow, as it is told, saved and drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.modes import Mode
+from chuteflow.stability.verdict import Stability
+from chuteflow.steady.flow import Flow
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is known of one flow: its stability and its leading modes, or in ``reason`` why it is not known."""
+
+    flow: Flow
+    found: Stability | None
+    modes: tuple[Mode, ...]
+    reason: str | None
+
+    @cached_property
+    def budget(self) -> Budget | None:
+        """The energy budget of the leading mode, where there is one."""
+        return energy_budget(self.modes[0]) if self.modes else None
