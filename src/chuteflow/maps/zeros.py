@@ -81,8 +81,9 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     step = known.log_m[two] - known.log_m[one]
     place = share.copy()
     down = ~across
-    values = (known.excess[one], known.excess[two], known.excess_down[one] * step, known.excess_down[two] * step)
-    place[down] = _hermite_zero(*(of[down] for of in values), share[down])
+    one_down, two_down, apart = one[down], two[down], step[down]
+    slopes = known.excess_down[one_down] * apart, known.excess_down[two_down] * apart
+    place[down] = _hermite_zero(known.excess[one_down], known.excess[two_down], *slopes, share[down])
     log_q = _hermite(
         known.log_q[one], known.log_q[two], known.flux_down[one] * step, known.flux_down[two] * step, place
     )
