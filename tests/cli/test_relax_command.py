@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import sys
 
 import pytest
@@ -57,17 +58,16 @@ def test_the_picture_holds_the_way_and_the_steady_flows(monkeypatch, tmp_path):
         assert ax.get_xscale() == "log"
 
 
-@pytest.mark.parametrize(
-    ("heat", "verdict"),
-    [
-        ("1.1", "it comes to another flow of the same hold-up, Q = 6.6037"),
-        ("0.9", "it comes to rest at t = 2948.9: collisions take more energy"),
-    ],
-)
 @pytest.mark.slow
-def test_beyond_a_fold_the_verdict_says_where_it_goes(capsys, heat, verdict):
-    assert run(f"{PRODUCTIVE} --flow 2 --heat {heat} --duration 10000") == 0
-    assert capsys.readouterr().out.splitlines()[-1].startswith(verdict)
+def test_beyond_a_fold_the_verdict_says_where_it_goes(capsys):
+    assert run(f"{PRODUCTIVE} --flow 2 --heat 1.1 --duration 10000") == 0
+    verdict = capsys.readouterr().out.splitlines()[-1]
+    assert verdict.startswith("it comes to another flow of the same hold-up, Q = 6.6037")
+    assert run(f"{PRODUCTIVE} --flow 2 --heat 0.9 --duration 10000") == 0
+    verdict = capsys.readouterr().out.splitlines()[-1]
+    found = re.match(r"it comes to rest at t = ([0-9.]+): collisions take more energy", verdict)
+    assert found
+    assert float(found[1]) == pytest.approx(2949.0, abs=0.5)
 
 
 def test_the_rate_of_the_leading_mode_is_told_beside_what_was_seen(capsys):

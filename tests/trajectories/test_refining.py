@@ -139,14 +139,17 @@ def test_a_grid_that_grows_too_large_says_where_it_ends():
 def test_on_random_chutes_the_flows_are_those_of_a_finer_grid():
     random = np.random.default_rng(11)
     finer = replace(REFINEMENT, delta=0.1, finest=0.006, lengths=0.2, per_decade=20.0)
-    found = 0
+    found = doubtful = 0
     for _ in range(DRAWN):
         chute, mass = winding(random), float(random.uniform(6.0, 29.5))
         answer = flows(chute, M=mass)
-        assert answer.incomplete is None or "outside the range" in answer.incomplete
+        in_doubt = answer.incomplete is not None and "does not tell flows apart" in answer.incomplete
+        doubtful += in_doubt
+        assert in_doubt or answer.incomplete is None or "outside the range" in answer.incomplete
         assert len(answer) == crossings_of(carry_down(model(chute), 1e-3, 1e5, 30.0, finer), mass), (chute, mass)
         found += len(answer)
     assert found > DRAWN // 2
+    assert doubtful <= DRAWN // 10
 
 
 def winding(random):

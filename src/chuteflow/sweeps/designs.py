@@ -117,11 +117,12 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     if name in words:
         known = words[name][0]
         names = _listed(value)
-        for one in dict.fromkeys(map(_hashable, names)):
-            if one not in known:
-                if name not in OPEN or not isinstance(one, str):
-                    raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
-                known = (*known, one)
+        for one in names:
+            if isinstance(one, str) and one in known:
+                continue
+            if name not in OPEN or not isinstance(one, str):
+                raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
+            known = (*known, one)
         if not names:
             raise InputError(f"{key} = []: give at least one value")
         return Axis(name, np.array([known.index(one) for one in names], dtype=float), known)
@@ -133,10 +134,6 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     if not values:
         raise InputError(f"{key} = []: give at least one value")
     return Axis(name, np.array([number(key, one) for one in values]))
-
-
-def _hashable(value: Any) -> Any:
-    return value if isinstance(value, str) else shown(value)
 
 
 def _listed(value: Any) -> list[Any]:
