@@ -4,7 +4,7 @@
 # A = (1 - k)/(2 a), c = 1 + k/2; B = y - b the residual of the base condition; tau = ln P + P/p_1 the step variable.
 
 With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0
-for most laws. All arrays of a row are in the order of the curve.
+for most laws. Close to a free surface these are (3.20)-(3.22). All arrays of a row are in the order of the curve.
 """
 
 from __future__ import annotations
