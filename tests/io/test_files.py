@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import h5netcdf
+import h5py
 import numpy as np
 import pytest
 
@@ -111,6 +112,18 @@ def test_files_tell_how_far_flows_keep_to_the_theory(tmp_path):
         assert float(row["knudsen_number"]) == flow.validity.knudsen_number
 
 
+@pytest.mark.parametrize("name", ["flows", "curve"])
+def test_metadata_of_netcdf_have_checksums(name, tmp_path):
+    """Without them HDF5 may read damaged ones for ever: its formats have them from the second on."""
+    save(result_of(name), tmp_path / "a.nc")
+    begins = (tmp_path / "a.nc").read_bytes()[:9]
+    assert begins[:8] == b"\x89HDF\r\n\x1a\n"
+    assert begins[8] >= 2
+    # Texts of any length would lie in a heap without one.
+    with h5py.File(tmp_path / "a.nc") as file:
+        assert isinstance(file["restore"].attrs["head"], bytes)
+
+
 def test_csv_reads_as_a_table(tmp_path):
     path = tmp_path / "curve.csv"
     save(result_of("curve"), path)
@@ -143,6 +156,12 @@ def test_a_damaged_file_is_refused_in_one_line(suffix, damage, tmp_path):
         path.write_bytes(b"something else, entirely\n1,2,3\n")
     elif damage == "empty":
         path.write_bytes(b"")
+    elif suffix == ".nc":
+        with h5py.File(path, "r+") as file:
+            head = file["restore"].attrs["head"]
+            later = head.replace(b'"format": 1', b'"format": 9')
+            assert later != head
+            file["restore"].attrs["head"] = later
     else:
         later = whole.replace(b'"format": 1', b'"format": 9')
         assert later != whole

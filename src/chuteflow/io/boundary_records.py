@@ -123,10 +123,10 @@ def _write_csv(found: BoundarySet, stream: BinaryIO) -> None:
 
 
 def _write_netcdf(found: BoundarySet, stream: BinaryIO) -> None:
-    import h5netcdf
     import numpy as np
 
     from chuteflow.bifurcations.tracing import TURNS
+    from chuteflow.io.netcdf_file import create
 
     columns = _columns(found)
     kinds = ("none", *TURNS)
@@ -148,7 +148,7 @@ def _write_netcdf(found: BoundarySet, stream: BinaryIO) -> None:
             {"long_name": "estimated relative error of Q, h, M and the second parameter, the largest", "units": "1"},
         ),
     }
-    with h5netcdf.File(stream, "w") as file:
+    with create(stream) as file:
         file.dimensions = {"point": len(columns["error"])}
         file.attrs.update({"Conventions": "CF-1.11", **_about(found)})
         for name, (values, attributes) in described.items():

@@ -283,13 +283,13 @@ def _kept_in_csv(path: Path) -> Any:
 
 
 def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
-    import h5netcdf
+    from chuteflow.io.netcdf_file import create, fixed_text
 
     plane = found.plane
     x, y = plane.x.name, plane.y.name
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     fixed = {name: value for name, value in plane.chute.as_dict().items() if name not in (x, y)}
-    with h5netcdf.File(stream, "w") as file:
+    with create(stream) as file:
         layers = {"temperature": len(plane.temperatures)} if plane.temperatures else {}
         file.dimensions = {**layers, y: len(found.y), x: len(found.x)}
         file.attrs.update(
@@ -320,7 +320,7 @@ def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
         kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
         group = file.create_group("restore")
         group.attrs["long_name"] = "columns, from which chuteflow restores the map to the last bit"
-        group.attrs["kind"] = KIND
+        group.attrs["kind"] = fixed_text(KIND)
         group.dimensions = {"byte": len(kept)}
         _put(group, "columns", ("byte",), kept, {})
 
@@ -368,6 +368,7 @@ def _kept_in_netcdf(path: Path) -> Any:
     from chuteflow.io.netcdf_file import restored_group
 
     with restored_group(path) as group:
-        if group.attrs.get("kind") != KIND:
+        # Files of chuteflow 0.1 have it as a text of any length.
+        if group.attrs.get("kind") not in (KIND, KIND.encode()):
             return None
         return contract.parsed(bytes(group["columns"][...]))

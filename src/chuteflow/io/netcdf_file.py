@@ -41,7 +41,7 @@ _PER_FLOW = {"degree": "i4", "stretch": "f8", "error": "f8"}
 def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
     """Write ``result`` to ``stream``, in memory: HDF5 may end the process where a disk is full."""
     found = records.rows(result)
-    with h5netcdf.File(stream, "w") as file:
+    with create(stream) as file:
         file.dimensions = {"flow": len(found), "height_index": HEIGHTS}
         file.attrs.update(_attributes(result, scales))
         _write_numbers(file, found, scales)
@@ -51,6 +51,16 @@ def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
             _write_branches(file, found)
         _write_profiles(file, found, scales)
         _write_unknowns(file.create_group("restore"), result, found)
+
+
+def create(stream: BinaryIO) -> h5netcdf.File:
+    """A new file in ``stream``, whose metadata have checksums: HDF5 may read damaged ones without them for ever."""
+    return h5netcdf.File(stream, "w", libver=("v108", "v108"))
+
+
+def fixed_text(text: str) -> np.bytes_:
+    """A text in ASCII as an attribute that lies in its metadata: others lie in a heap, which has no checksum."""
+    return np.bytes_(text.encode("ascii"))
 
 
 def read(path: Path) -> Result:
@@ -200,10 +210,10 @@ def _write_profiles(file: h5netcdf.File, found: Sequence[Row], scales: Scales | 
 def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row]) -> None:
     solutions = [row.flow.solution for row in found]
     group.attrs["long_name"] = "discretised unknowns, from which chuteflow rebuilds the flows to the last bit"
-    group.attrs["head"] = contract.text(records.head(result, found))
+    group.attrs["head"] = fixed_text(contract.text(records.head(result, found)))
     breaks = [list(s.problem.breaks) if s.problem.breaks != WHOLE else [] for s in solutions]
     if any(breaks):
-        group.attrs["breaks"] = contract.text(breaks)
+        group.attrs["breaks"] = fixed_text(contract.text(breaks))
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]
