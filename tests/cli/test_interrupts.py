@@ -17,22 +17,12 @@ from chuteflow.cli import interrupts
 from chuteflow.cli.commands import hot
 from chuteflow.cli.program import main
 
+from ..studies import study_at_temperatures
+
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")
 
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
-STUDY = """
-[design]
-kind = "sobol"
-points = 100000
-[parameters]
-slope = {from = 0.2, to = 0.4}
-e = 0.8
-ew = [0.7, 0.8]
-roughness = {from = 0.5, to = 0.8}
-T_surface = {from = 0.5, to = 50.0, scale = "log"}
-[results]
-chunk = 64
-"""
+STUDY = study_at_temperatures("sobol", 100_000, 64)
 #: Commands that take long, with what they need.
 LONG = {
     "sweep": "sweep study.toml --out study.zarr --workers 2",

@@ -12,19 +12,9 @@ import xarray
 
 from chuteflow.cli.program import main
 
-STUDY = """
-[design]
-kind = "sobol"
-points = 60
-[parameters]
-slope = {from = 0.2, to = 0.4}
-e = 0.8
-ew = [0.7, 0.8]
-roughness = {from = 0.5, to = 0.8}
-T_surface = {from = 0.5, to = 50.0, scale = "log"}
-[results]
-chunk = 12
-"""
+from ..studies import study_at_temperatures
+
+STUDY = study_at_temperatures("sobol", 60, 12)
 CHUNKS = 5
 #: The command with no file that it writes above 64 bytes, as if the disk were full there.
 SMALL = (

@@ -19,21 +19,9 @@ from chuteflow.sweeps.store import DamageError, Marker, Store
 from chuteflow.sweeps.study import read
 from chuteflow.sweeps.work import work
 
-STUDY = """
-[design]
-kind = "random"
-points = 24
-seed = 3
-[parameters]
-slope = {from = 0.2, to = 0.4}
-e = 0.8
-ew = [0.7, 0.8]
-roughness = {from = 0.5, to = 0.8}
-T_surface = {from = 0.5, to = 50.0, scale = "log"}
-[results]
-chunk = 6
-quantities = ["mass_flux", "density"]
-"""
+from ..studies import study_at_temperatures
+
+STUDY = study_at_temperatures("random", 24, 6, design="seed = 3", results='quantities = ["mass_flux", "density"]')
 CHUNKS = 4
 
 

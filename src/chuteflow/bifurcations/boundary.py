@@ -17,7 +17,7 @@ from chuteflow.bifurcations.system import Sweep
 from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
 from chuteflow.branches.families import TracedFamily
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import Searched
+from chuteflow.branches.results import LineOfFlows, Searched
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -54,7 +54,7 @@ class Turning:
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary:
+class Boundary(LineOfFlows):
     """Flows of one kind of special point, in order as the ``second`` parameter of their chutes varies.
 
     ``error`` (k,) are the estimated relative errors, the largest of Q, h, M and the parameter; ``special`` are
@@ -93,26 +93,6 @@ class Boundary:
     def parameter(self) -> Array:
         """The second parameter along the boundary, (k,)."""
         return np.array([getattr(flow.chute, self.second) for flow in self.flows])
-
-    @cached_property
-    def mass_flux(self) -> Array:
-        """Q along the boundary."""
-        return np.array([flow.mass_flux for flow in self.flows])
-
-    @cached_property
-    def centre_of_mass(self) -> Array:
-        """h along the boundary."""
-        return np.array([flow.centre_of_mass for flow in self.flows])
-
-    @cached_property
-    def mass_holdup(self) -> Array:
-        """M along the boundary."""
-        return np.array([flow.mass_holdup for flow in self.flows])
-
-    @cached_property
-    def surface_temperature(self) -> Array:
-        """T_surface along the boundary."""
-        return np.array([flow.surface_temperature for flow in self.flows])
 
     @property
     def cusps(self) -> tuple[Turning, ...]:

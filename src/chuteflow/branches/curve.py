@@ -82,7 +82,7 @@ def curve(
         searched=searched(within, grid),
         tolerance=tolerance,
         reason=None if branches else imbalance(problem),
-        incomplete=next(iter(doubts), None) or doubt(grid, within, lost, "a family"),
+        incomplete=next(iter(doubts), None) or doubt(grid, within, lost, ("a family", "families")),
     )
 
 

@@ -157,7 +157,7 @@ def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
 
 def _left_out(found: _Search, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = doubt(found.grid, found.within, found.lost, "a flow", which, value)
+    left = doubt(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
     if left is not None:
         return left
     for lead in _leads(found, which, value):

@@ -257,12 +257,19 @@ def searched(within: Range, grid: TrajectoryGrid) -> Searched:
 
 
 def doubt(
-    grid: TrajectoryGrid, within: Range, lost: list[Array], what: str, which: int = 0, value: float | None = None
+    grid: TrajectoryGrid,
+    within: Range,
+    lost: list[Array],
+    names: tuple[str, str],
+    which: int = 0,
+    value: float | None = None,
 ) -> str | None:
-    """What the search leaves open in the range, in words: flows seen and not solved, with the rough quantities
-    ``lost``, depths not reached, cells that may hide flows, where a value is given only those near it."""
+    """What the search leaves open in the range, in words: what was seen and not solved, with rough quantities ``lost``
+    and the ``names`` of one and of several; depths not reached; cells that may hide flows, where a value is given
+    only those near it."""
     if lost:
-        many = f"{len(lost)} {'families' if what == 'a family' else 'flows'} were" if len(lost) > 1 else f"{what} was"
+        one, several = names
+        many = f"{len(lost)} {several} were" if len(lost) > 1 else f"{one} was"
         return f"{many} seen and not solved, near {_place(lost[0])}"
     if grid.deepest < within.deepest * (1.0 - 1e-9):
         return f"beyond a hold-up of {grid.deepest:.4g} there are too many flows to search"
@@ -289,17 +296,22 @@ def crossings(
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
     near[_turns_near(off, family.arclength)] = True
+    crossed: list[tuple[int, Array]] = []
     for place, piece in family.pieces:
         there = piece[:, which] - target
         if np.abs(there).min() < _NEAR_TURN or (there >= 0.0).any() != (off[place] >= 0.0):
             near[place] = True
+        if (there >= 0.0).any() and (there < 0.0).any():
+            crossed.append((place, piece))
     found: list[Solution] = []
     lost: list[Array] = []
     for begin, end in _runs(near, family.arclength):
         single = _solve_single(family, which, target, off, begin, end, tolerance)
         solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
-        if solved is None and family.separate:
-            lost += [m[i] for i in changes.tolist() if begin <= i < end]
+        if solved is None:
+            if family.separate:
+                lost += [m[i] for i in changes.tolist() if begin <= i < end]
+            lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
         found += solved or []
     return found, lost
 

@@ -107,8 +107,34 @@ KINDS = {
 }
 
 
+class LineOfFlows:
+    """What the ``flows`` of a line, in order, have along it: arrays (k,)."""
+
+    flows: tuple[Flow, ...]
+
+    @cached_property
+    def mass_flux(self) -> Array:
+        """Q along the line."""
+        return np.array([flow.mass_flux for flow in self.flows])
+
+    @cached_property
+    def centre_of_mass(self) -> Array:
+        """h along the line."""
+        return np.array([flow.centre_of_mass for flow in self.flows])
+
+    @cached_property
+    def mass_holdup(self) -> Array:
+        """M along the line."""
+        return np.array([flow.mass_holdup for flow in self.flows])
+
+    @cached_property
+    def surface_temperature(self) -> Array:
+        """T_surface along the line."""
+        return np.array([flow.surface_temperature for flow in self.flows])
+
+
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(LineOfFlows):
     """One family of flows in order along its curve; ``ends`` says in words why it ends at either side."""
 
     flows: tuple[Flow, ...]
@@ -122,26 +148,6 @@ class Branch:
 
     def _repr_html_(self) -> str:
         return display.html_table(repr(self)[1:-1], ["", *(NUMBERS[name].symbol for name in PLACE)], _stations(self))
-
-    @cached_property
-    def mass_flux(self) -> Array:
-        """Q along the branch."""
-        return np.array([flow.mass_flux for flow in self.flows])
-
-    @cached_property
-    def centre_of_mass(self) -> Array:
-        """h along the branch."""
-        return np.array([flow.centre_of_mass for flow in self.flows])
-
-    @cached_property
-    def mass_holdup(self) -> Array:
-        """M along the branch."""
-        return np.array([flow.mass_holdup for flow in self.flows])
-
-    @cached_property
-    def surface_temperature(self) -> Array:
-        """T_surface along the branch."""
-        return np.array([flow.surface_temperature for flow in self.flows])
 
 
 @dataclass(frozen=True, eq=False)

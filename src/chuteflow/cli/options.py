@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -271,6 +271,26 @@ def search(given: Mapping[str, Any]) -> dict[str, Any]:
         "largest_holdup": given["largest_holdup"],
     }
     return {name: value for name, value in arguments.items() if value is not None}
+
+
+def deliver_object(
+    given: Mapping[str, Any],
+    content: Any,
+    report: Iterable[str],
+    rows: Callable[[], Iterable[Sequence[str]]],
+    plot: Callable[[], Figure],
+) -> None:
+    """Print the object ``content`` with --json, else the lines of ``report``; write it, or ``rows``, to the file that
+    --save names; and draw. See :func:`deliver`.
+
+    Raises:
+        InputError: once the answer is printed, for files that could not be written.
+    """
+    from chuteflow.io import contract
+    from chuteflow.io.files import write_answer
+
+    answer = contract.text(content) if given["as_json"] else "\n".join(report)
+    deliver(given, answer, lambda path: write_answer(path, lambda: content, rows), plot)
 
 
 def deliver(

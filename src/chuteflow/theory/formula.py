@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from chuteflow.checks import number, shown
@@ -109,11 +109,6 @@ def crossings(values: Field, places: Field, between) -> list[float]:
                 high = middle
         found.append(high)
     return found
-
-
-def settings_of(formula: object) -> dict[str, float | str | bool | None]:
-    """The parameters of a formula by name."""
-    return {field.name: getattr(formula, field.name) for field in fields(formula)}  # pyright: ignore[reportArgumentType]
 
 
 def parsed(formula: object, name: str, text: str) -> float | str | bool | None:

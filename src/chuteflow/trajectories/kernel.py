@@ -346,8 +346,8 @@ def carry(
         half_tau = _lengths(slope, p_s, p_1, overburden[row - 1], over, lengths) if row > 0 else 0.0
         for j in range(n):
             if row == 0 or in_series[j]:
-                warmth = theta[j] / (1.0 + values[0, BETA])
-                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(warmth), start_at_most))
+                log_scale = theta[j] / (1.0 + values[0, BETA])
+                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(log_scale), start_at_most))
                 if row == 0 or in_series[j]:
                     _start(values, slope, p_s, y_s, theta[j], over, rows, j)
                     continue

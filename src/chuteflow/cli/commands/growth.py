@@ -77,21 +77,13 @@ def command(**given: Any) -> None:
             progress=lambda share: progress.tell(f"{share:.0%} of the map"),
             **size,
         )
-    content = wave_object(mapped)
 
     def plotted() -> Figure:
         from chuteflow.plotting.growth_plot import plot_wave_map
 
         return plot_wave_map(mapped)
 
-    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
-
-    def save(path: str) -> None:
-        from chuteflow.io.files import write_answer
-
-        write_answer(path, lambda: content, lambda: wave_rows(mapped))
-
-    options.deliver(given, answer, save, plotted)
+    options.deliver_object(given, wave_object(mapped), _report(mapped), lambda: wave_rows(mapped), plotted)
 
 
 def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:

@@ -67,21 +67,13 @@ def command(**given: Any) -> None:
             progress=lambda share: progress.tell(f"{share:.0%} of the map"),
             **asked,
         )
-    content = family_object(mapped)
 
     def plotted() -> Figure:
         from chuteflow.plotting.growth_plot import plot_family_map
 
         return plot_family_map(mapped)
 
-    answer = contract.text(content) if given["as_json"] else "\n".join(_report(mapped))
-
-    def save(path: str) -> None:
-        from chuteflow.io.files import write_answer
-
-        write_answer(path, lambda: content, lambda: family_rows(mapped))
-
-    options.deliver(given, answer, save, plotted)
+    options.deliver_object(given, family_object(mapped), _report(mapped), lambda: family_rows(mapped), plotted)
 
 
 def _angle(waves: str | None) -> float:

@@ -71,8 +71,9 @@ def command(**given: Any) -> None:
     moments = _followed(layer, start, duration)
     end = outcome(layer, moments)
     content = _content(flow, moments, end)
-    answer = contract.text(content) if given["as_json"] else "\n".join(_told(flow, moments, end))
-    options.deliver(given, answer, partial(_save, content), partial(_plotted, flow, moments, end))
+    options.deliver_object(
+        given, content, _told(flow, moments, end), partial(_rows, content), partial(_plotted, flow, moments, end)
+    )
 
 
 def _found(given: Mapping[str, Any]) -> FlowSet:
@@ -161,12 +162,9 @@ def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
     )
 
 
-def _save(content: dict[str, Any], path: str) -> None:
-    from chuteflow.io.files import write_answer
-
+def _rows(content: dict[str, Any]) -> list[list[str]]:
     columns = (content[symbol] for symbol in _COLUMNS)
-    rows = [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
-    write_answer(path, lambda: content, lambda: rows)
+    return [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
 
 
 def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Figure:
