@@ -159,6 +159,7 @@ def test_a_damaged_file_is_refused_in_one_line(suffix, damage, tmp_path):
     elif suffix == ".nc":
         with h5py.File(path, "r+") as file:
             head = file["restore"].attrs["head"]
+            assert isinstance(head, bytes)
             later = head.replace(b'"format": 1', b'"format": 9')
             assert later != head
             file["restore"].attrs["head"] = later
