@@ -247,7 +247,7 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
 
 def search(model: Model, within: Range) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
-    return carry_down(model, within.coldest, within.hottest, within.deepest)
+    return carry_down(model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux)
 
 
 def searched(within: Range, grid: TrajectoryGrid) -> Searched:

@@ -23,13 +23,15 @@ class Range:
     """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
 
     A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
-    proportion to their temperature, and no family ends so.
+    proportion to their temperature, and no family ends so. Mass fluxes above ``largest_flux`` are not asked for: a
+    branch may end on its way to them.
     """
 
     coldest: float
     hottest: float
     deepest: float
     shallowest: float
+    largest_flux: float = np.inf
 
     @classmethod
     def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
