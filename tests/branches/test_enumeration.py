@@ -198,6 +198,25 @@ def test_one_trajectory_with_four_bases():
     assert fluxes == pytest.approx([156.948, 338.508, 353.494, 1042.708], rel=1e-5)
 
 
+def test_a_surface_temperature_near_the_limit_of_a_deep_branch():
+    # T_surface of the flows of hold-up 9 to 30 differs by 6e-6, less than rough flows are wrong by: at the end of the
+    # branch, where no deeper flow could tell, the rough one was on the wrong side.
+    chute = Chute(0.522571, 0.657921, 0.023403, 0.612599, "interface")
+    for mass in (9.0, 12.0):
+        (flow,) = flows(chute, M=mass)
+        (found,) = flows(chute, T_surface=flow.surface_temperature)
+        assert found.mass_holdup == pytest.approx(mass, rel=1e-8)
+        assert abs(found.mass_holdup / mass - 1.0) <= found.error + 1e-10
+
+
+def test_where_the_surface_temperature_does_not_tell_the_error_does():
+    # All flows deeper than 23 have it to rounding.
+    chute = Chute(0.522571, 0.657921, 0.023403, 0.612599, "interface")
+    (flow,) = flows(chute, M=29.0)
+    (found,) = flows(chute, T_surface=flow.surface_temperature)
+    assert abs(np.log(found.mass_holdup / flow.mass_holdup)) <= found.error
+
+
 def test_just_below_lambda_3_an_answer_comes_at_once():
     for slope in (0.372, 0.3735, 0.3739, 0.374):
         begin = time.process_time()

@@ -59,6 +59,8 @@ _AT_EDGE = 1e-6
 _HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
+#: A logarithm that differs by less is at its value.
+_ROUNDING = 1e-14
 #: Why a branch ends where it is lost.
 LOST = "it could not be followed further"
 #: Searches whose result is remembered.
@@ -143,7 +145,8 @@ class Family:
     def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
-        it, and goes away from it beyond, so that a fold near to the target lies between.
+        it, and goes away from it beyond, so that a fold near to the target lies between; or they are ends of the
+        branch, at which a rough flow may be on the wrong side.
 
         Raises:
             SolveError: where the branch could not be followed.
@@ -151,15 +154,19 @@ class Family:
 
         def tried(places: list[int], outward: float) -> tuple[int, Point]:
             """The first that is on its side, where the quantity goes away from the target outwards; or is on its
-            side at least."""
-            second = None
+            side at least; or is an end of the branch."""
+            second = at_end = None
             for i in places:
                 point, off = self.solved(i, tolerance), float(self.macroscopic[i, which]) - target
-                if point is None or (point.m[which] >= target) != (off >= 0.0):
+                if point is None:
+                    continue
+                if (point.m[which] >= target) != (off >= 0.0):
+                    at_end = (i, point) if i in (0, whole) else at_end
                     continue
                 if outward * point.tangent[which] * (1.0 if off >= 0.0 else -1.0) > 0.0:
                     return i, point
                 second = second or (i, point)
+            second = second or at_end
             if second is None:
                 raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
             return second
@@ -425,11 +432,21 @@ def _on_path(points: list[Point], which: int, target: float, tolerance: float) -
     turning = turns(points, which, tolerance)
     placed += [(turn.place, turn.point) for turn in turning]
     placed.sort(key=lambda pair: pair[0])
+    along = [point for _, point in placed]
+    off = np.array([float(point.m[which]) - target for point in along])
+    crossed = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0)).tolist()
     found = []
-    for (_, one), (_, other) in pairwise(placed):
-        ends = float(one.m[which]) - target, float(other.m[which]) - target
-        if (ends[0] >= 0.0) != (ends[1] >= 0.0):
-            found.append(_between(Chord(one, other, tolerance), which, target))
+    for first, last in _level(along, off):
+        # The flow is anywhere on this piece.
+        there = [i for i in crossed if first <= i < last]
+        if not there and np.abs(off[first : last + 1]).min() > _ROUNDING:
+            continue
+        crossed = [i for i in crossed if i not in there]
+        chords = [Chord(along[i], along[i + 1], tolerance) for i in there[:1]]
+        solution = _between(chords[0], which, target) if chords else along[(first + last) // 2].solution
+        reach = max(float(np.linalg.norm(along[k].m - solution.macroscopic)) for k in (first, last))
+        found.append(replace(solution, error=max(solution.error, reach)))
+    found += [_between(Chord(along[i], along[i + 1], tolerance), which, target) for i in crossed]
     for turn in turning:
         # A fold that is at the value to its error is one flow, unless two were found beside it.
         near = turn.point.solution
@@ -438,6 +455,18 @@ def _on_path(points: list[Point], which: int, target: float, tolerance: float) -
         if close and not any(np.linalg.norm(s.macroscopic - near.macroscopic) < reach for s in found):
             found.append(_at_fold(near))
     return found
+
+
+def _level(along: list[Point], off: Array) -> list[tuple[int, int]]:
+    """The first and last points of the pieces on which a quantity, given how far it is ``off`` its value, is at that
+    value to the error of the flows at more than one point."""
+    at_value = np.abs(off) <= max(point.solution.error for point in along)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_value, [False]]).astype(int)))
+    return [
+        (max(first - 1, 0), min(end, len(along) - 1))
+        for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        if end - first > 1
+    ]
 
 
 def _at_fold(near: Solution) -> Solution:
