@@ -56,7 +56,7 @@ class Chute(NamedTuple):
 
 @dataclass(frozen=True)
 class Fineness:
-    """How finely the curve of states is followed: distance of neighbours, steps in ln p and in p, trajectories a decade."""
+    """How finely the curve is followed: distance of neighbours, steps in ln p and in p, trajectories a decade."""
 
     delta: float = 0.03
     log_step: float = 0.06
@@ -213,9 +213,8 @@ def look(entries, p, state, scale, seen):
     seen[0], seen[1], seen[2] = kappa, y, y - at(entries, i, t, BASE)
     # Nothing depends on a density that is small enough.
     thin = kappa + 5.0
-    seen[3] = 0.1 * max(kappa, -20.0) + 0.9 * (
-        thin + math.log1p(math.exp(-thin)) if thin > 0.0 else math.log1p(math.exp(thin))
-    )
+    dense = thin + math.log1p(math.exp(-thin)) if thin > 0.0 else math.log1p(math.exp(thin))
+    seen[3] = 0.1 * max(kappa, -20.0) + 0.9 * dense
 
 
 @numba.njit(cache=True)
@@ -231,8 +230,10 @@ def quantities(entries, p, stress, state, out):
 
 
 @numba.njit(cache=True)
-def between(x0, x1, x2, x3, f0, f1, f2, f3, x):
-    """Monotone cubic interpolation in [x1, x2] (Fritsch and Butland's slopes)."""
+def between(knots, values, x):
+    """Monotone cubic interpolation between the second and the third of four knots (Fritsch and Butland's slopes)."""
+    x0, x1, x2, x3 = knots
+    f0, f1, f2, f3 = values
     h0, h1, h2 = x1 - x0, x2 - x1, x3 - x2
     d1 = (f2 - f1) / h1
     left = right = d1
@@ -244,6 +245,19 @@ def between(x0, x1, x2, x3, f0, f1, f2, f3, x):
         right = 0.0 if d1 * d2 <= 0.0 else 3.0 * (h1 + h2) / ((2.0 * h1 + h2) / d2 + (h1 + 2.0 * h2) / d1)
     t = (x - x1) / h1
     return f1 + h1 * t * (left + t * (3.0 * d1 - 2.0 * left - right + t * (left + right - 2.0 * d1)))
+
+
+@numba.njit(cache=True)
+def insert(now, seen, places, knots, x, p, out):
+    """A trajectory between two neighbours at one depth: theta, y, ln T_surface and the logarithms of the integrals."""
+    a, b, c, d = places
+    for q in (THETA, LABEL):
+        out[q] = between(knots, (now[a, q], now[b, q], now[c, q], now[d, q]), x)
+    y = between(knots, (seen[a, 1], seen[b, 1], seen[c, 1], seen[d, 1]), x)
+    out[HEAT] = y * p * math.exp(0.5 * out[THETA])
+    for q in (HEIGHT, GLIDE):
+        logs = (math.log(now[a, q]), math.log(now[b, q]), math.log(now[c, q]), math.log(now[d, q]))
+        out[q] = math.exp(between(knots, logs, x))
 
 
 @numba.njit(cache=True)
@@ -320,36 +334,14 @@ def carry(entries, depths, stress, surface_flux, log_t, delta, scale, hot_limit,
                 # The far end of the curve is beyond all base conditions: a point half way.
                 extra = 1
             else:
-                extra = min(int(math.ceil(gap / allowed)) - 1, 6)
+                extra = min(math.ceil(gap / allowed) - 1, 6)
             left = apart(seen, i - 1, i, scale) if i > 0 and linked[i - 1] else 0.0
             right = apart(seen, i + 1, i + 2, scale) if i + 2 < n and linked[i + 1] else 0.0
             h = i - 1 if left > 0.0 else i
             j = i + 2 if right > 0.0 else i + 1
             for k in range(extra):
                 x = gap * (k + 1.0) / (extra + 1.0)
-                theta = between(
-                    -left, 0.0, gap, gap + right, now[h, THETA], now[i, THETA], now[i + 1, THETA], now[j, THETA], x
-                )
-                y = between(-left, 0.0, gap, gap + right, seen[h, 1], seen[i, 1], seen[i + 1, 1], seen[j, 1], x)
-                new[m, THETA] = theta
-                new[m, HEAT] = y * p1 * math.exp(0.5 * theta)
-                new[m, LABEL] = between(
-                    -left, 0.0, gap, gap + right, now[h, LABEL], now[i, LABEL], now[i + 1, LABEL], now[j, LABEL], x
-                )
-                for c in (HEIGHT, GLIDE):
-                    new[m, c] = math.exp(
-                        between(
-                            -left,
-                            0.0,
-                            gap,
-                            gap + right,
-                            math.log(now[h, c]),
-                            math.log(now[i, c]),
-                            math.log(now[i + 1, c]),
-                            math.log(now[j, c]),
-                            x,
-                        )
-                    )
+                insert(now, seen, (h, i, i + 1, j), (-left, 0.0, gap, gap + right), x, p1, new[m])
                 look(entries, p1, new[m], scale, seen_new[m])
                 parent[m] = -1
                 linked_new[m] = True
@@ -461,10 +453,7 @@ class BruteForce:
 
     def depths(self, deepest: float, fineness: Fineness, coldest: float) -> np.ndarray:
         """Normal stresses, even in the logarithm of the overburden near the surface and even below."""
-        if self.chute.surface_stress:
-            first = 1e-9
-        else:
-            first = min(1e-6 * coldest, 1e-6)
+        first = 1e-9 if self.chute.surface_stress else 1e-6 * min(coldest, 1.0)
         turn = min(fineness.step / fineness.log_step, 0.5 * deepest)
         above = np.geomspace(first, turn, max(2, math.ceil(math.log(turn / first) / fineness.log_step)))
         below = np.linspace(turn, deepest, max(2, math.ceil((deepest - turn) / fineness.step) + 1))

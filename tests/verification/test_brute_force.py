@@ -1,6 +1,7 @@
 """The flows that are given, beside those of a brute force that shares nothing with the program (``brute_force``).
 
-CHUTEFLOW_BRUTE_FORCE sets the share of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners, some 40 minutes.
+CHUTEFLOW_BRUTE_FORCE sets the share of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners,
+some 20 minutes.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from .brute_force import NEAR, QUANTITIES, BruteForce, Chute, Fineness, Found, b
 
 SHARE = float(os.environ.get("CHUTEFLOW_BRUTE_FORCE", "0.02"))
 DEEP = json.loads((Path(__file__).parents[1] / "branches" / "deep_flows.json").read_text())
+SURFACES, CLOSURES = ("free", "interface"), ("lun", "lun-fourier")
 ARGUMENTS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 #: Ranges of Q, h, M and T_surface that are asked for.
 WIDE = ((1e-3, 1e4), (1e-2, 1e4), (1e-2, 25.0), (1e-3, 1e5))
@@ -114,11 +116,9 @@ def compare(tally: Tally, chute: Chute, name: str, value: float, deepest: float,
     if tally.seconds[-1] > LIMIT:
         tally.wrong.append(f"slow: {where}: {tally.seconds[-1]:.2f} s")
     given = macroscopic(answer)
-    inside = (
-        BruteForce(chute, deepest).inside(given, name)
-        if name != "T_surface"
-        else given[given[:, 2] < math.log(deepest)]
-    )
+    inside = given[given[:, 2] < math.log(deepest)]
+    if name != "T_surface":
+        inside = BruteForce(chute, deepest).inside(given, name)
     if not paired(expected.flows, inside):
         expected = brute(chute, name, value, deepest, FINER)
     tally.flows += len(expected.flows)
@@ -126,13 +126,8 @@ def compare(tally: Tally, chute: Chute, name: str, value: float, deepest: float,
         tally.undecided += 1
         return
     if not paired(expected.flows, inside):
-        kind = (
-            "missed"
-            if len(inside) < len(expected.flows)
-            else "invented"
-            if len(inside) > len(expected.flows)
-            else "other"
-        )
+        more = len(inside) - len(expected.flows)
+        kind = "other" if more == 0 else "missed" if more < 0 else "invented"
         if kind == "missed" and answer.incomplete:
             kind = "refused"
         told = f"{len(inside)} for {len(expected.flows)}; incomplete: {answer.incomplete}"
@@ -160,7 +155,7 @@ def check_claims(tally: Tally, chute: Chute, name: str, value: float, answer: Fl
 
 def random_chute(rng: np.random.Generator, slopes: Callable[[Chute], float], least_e: float, most_e: float) -> Chute:
     e, e_w, r = (float(rng.uniform(*span)) for span in ((least_e, most_e), (0.0, 1.0), (0.5, math.sqrt(0.75))))
-    surface, closure = str(rng.choice(["free", "interface"])), str(rng.choice(["lun", "lun-fourier"]))
+    surface, closure = str(rng.choice(SURFACES)), str(rng.choice(CLOSURES))
     chute = Chute(0.3, round(e, 6), round(e_w, 6), round(r, 6), surface, closure)
     return chute._replace(slope=round(slopes(chute), 6))
 
@@ -220,16 +215,15 @@ def questions(rng: np.random.Generator, chute: Chute, deep_only: bool) -> Iterat
 def run(group: str, share: float, seed: int = 14) -> Tally:
     """A share of one group of chutes."""
     sample, number, deep_only = GROUPS[group]
-    tally = Tally()
+    tally, seen = Tally(), 0
     for i in range(max(1, round(share * number))):
         rng = np.random.default_rng([seed, list(GROUPS).index(group), i])
         chute = sample(rng)
         for name, value, expected, deepest in questions(rng, chute, deep_only):
-            before = len(tally.wrong)
             compare(tally, chute, name, value, deepest, expected)
-            for line in tally.wrong[before:]:
-                print(group, i, line, flush=True)
         check_families(tally, chute)
+        print(*(f"{group} {i} {line}\n" for line in tally.wrong[seen:]), sep="", end="", flush=True)
+        seen = len(tally.wrong)
     print(group, tally, flush=True)
     return tally
 
@@ -237,10 +231,8 @@ def run(group: str, share: float, seed: int = 14) -> Tally:
 def check_families(tally: Tally, chute: Chute) -> None:
     """Half of delta gives the same numbers of flows at some hold-ups, unless a fold is near."""
     problem = model(chute_of(chute))
-    grids = [
-        carry_down(problem, 1e-3, 1e5, DEEPEST, replace(REFINEMENT, delta=d))
-        for d in (REFINEMENT.delta, 0.5 * REFINEMENT.delta)
-    ]
+    refinements = [replace(REFINEMENT, delta=share * REFINEMENT.delta) for share in (1.0, 0.5)]
+    grids = [carry_down(problem, 1e-3, 1e5, DEEPEST, refinement) for refinement in refinements]
     deepest = min(grid.deepest for grid in grids)
     for mass in np.geomspace(0.01, 0.98, 12) * deepest:
         counts = [
@@ -255,7 +247,7 @@ def check_families(tally: Tally, chute: Chute) -> None:
 CORNERS = [
     (Chute(slope, e, e_w, r, surface, closure), name, value)
     for slope, e, e_w, r, surface, closure in product(
-        (1e-3, 0.3, 1e2), (1e-3, 0.8, 1.0), (0.0, 1.0), (0.5, math.sqrt(0.75)), ("free", "interface"), ("lun", "lun-fourier")
+        (1e-3, 0.3, 1e2), (1e-3, 0.8, 1.0), (0.0, 1.0), (0.5, math.sqrt(0.75)), SURFACES, CLOSURES
     )
     for name, value in (
         ("Q", 1e-6), ("Q", 1.0), ("Q", 1e6), ("h", 1e-6), ("h", 1e6), ("M", 1e-6), ("M", 300.0), ("T_surface", 1e-6),
