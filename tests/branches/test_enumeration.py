@@ -209,6 +209,13 @@ def test_a_surface_temperature_near_the_limit_of_a_deep_branch():
         assert abs(found.mass_holdup / mass - 1.0) <= found.error + 1e-10
 
 
+def test_a_surface_temperature_near_the_limit_of_thin_flows():
+    # Of thinner flows than this one it differs by 1e-8. By the brute force of tests/verification.
+    chute = Chute(0.359172, 0.48837, 0.473461, 0.831665, "interface", "lun-fourier")
+    (found,) = flows(chute, T_surface=0.004624141801388148)
+    assert found.mass_holdup == pytest.approx(1.18155e-8, rel=1e-4)
+
+
 def test_where_the_surface_temperature_does_not_tell_the_error_does():
     # All flows deeper than 23 have it to rounding.
     chute = Chute(0.522571, 0.657921, 0.023403, 0.612599, "interface")

@@ -136,7 +136,7 @@ def table(chute: Chute) -> np.ndarray:
     return np.ascontiguousarray(np.stack([values[3:-3], slopes], axis=2))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def place_of(kappa):
     """The entry of the table before kappa, and the fraction of the way to the next."""
     x = min(max((kappa - FIRST) / SPACING, 0.0), PLACES - 1.001)
@@ -144,7 +144,7 @@ def place_of(kappa):
     return i, x - i
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def at(entries, i, t, which):
     """One function between two entries."""
     f, f_slope = entries[i, which, 0], entries[i, which, 1]
@@ -153,7 +153,7 @@ def at(entries, i, t, which):
     return f + t * (f_slope + t * (3.0 * d - 2.0 * f_slope - g_slope + t * (f_slope + g_slope - 2.0 * d)))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def rates(entries, p, stress, theta, q):
     """d/dp of theta, q and the two integrals."""
     root = math.exp(0.5 * theta)
@@ -166,7 +166,7 @@ def rates(entries, p, stress, theta, q):
     return d_theta, d_q, d_height, d_glide
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def advance(entries, p, dp, stress, state):
     """One step of the classical Runge-Kutta method, in place."""
     th, q = state[THETA], state[HEAT]
@@ -180,7 +180,7 @@ def advance(entries, p, dp, stress, state):
     state[GLIDE] += dp / 6.0 * (a3 + 2.0 * b3 + 2.0 * c3 + d3)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def begin(entries, p, stress, surface_flux, log_t, state):
     """The state at the first depth ``p``, from the leading terms at the surface."""
     root = math.exp(0.5 * log_t)
@@ -204,7 +204,7 @@ def begin(entries, p, stress, surface_flux, log_t, state):
     state[GLIDE] = 0.5 * over * over * at(entries, i, t, SHEAR) * root
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def look(entries, p, state, scale, seen):
     """kappa, y, the residual of the base condition and the metric of kappa: ``seen`` (4,)."""
     kappa = math.log(p) - state[THETA]
@@ -217,7 +217,7 @@ def look(entries, p, state, scale, seen):
     seen[3] = 0.1 * max(kappa, -20.0) + 0.9 * dense
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def quantities(entries, p, stress, state, out):
     """ln Q, ln h, ln M and ln T_surface of a flow that has its base here."""
     over = p - stress
@@ -229,7 +229,7 @@ def quantities(entries, p, stress, state, out):
     out[3] = state[LABEL]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def between(knots, values, x):
     """Monotone cubic interpolation between the second and the third of four knots (Fritsch and Butland's slopes)."""
     x0, x1, x2, x3 = knots
@@ -247,7 +247,7 @@ def between(knots, values, x):
     return f1 + h1 * t * (left + t * (3.0 * d1 - 2.0 * left - right + t * (left + right - 2.0 * d1)))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def insert(now, seen, places, knots, x, p, out):
     """A trajectory between two neighbours at one depth: theta, y, ln T_surface and the logarithms of the integrals."""
     a, b, c, d = places
@@ -260,12 +260,12 @@ def insert(now, seen, places, knots, x, p, out):
         out[q] = math.exp(between(knots, logs, x))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def apart(seen, i, j, scale):
     return math.hypot(seen[j, 3] - seen[i, 3], (seen[j, 1] - seen[i, 1]) / scale)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def zero_segment(entries, p0, p1, stress, corners, residuals, at_first, pair, one, other):
     """The ends of the zero line in a triangle, each by ln Q, ln h, ln M, ln T_surface; False if there is none."""
     n = 0
@@ -281,7 +281,7 @@ def zero_segment(entries, p0, p1, stress, corners, residuals, at_first, pair, on
     return n == 2
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def carry(entries, depths, stress, surface_flux, log_t, delta, scale, hot_limit, most, most_segments):
     """The segments of zeros (S, 2, 4), and the row reached."""
     rows = len(depths)
@@ -400,7 +400,7 @@ def carry(entries, depths, stress, surface_flux, log_t, delta, scale, hot_limit,
     return segments[:s], rows
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def along(entries, depths, stress, surface_flux, log_t, scale, zeros):
     """Zeros of the residual on one trajectory: their number, with ln Q, ln h, ln M, ln T in ``zeros``."""
     state, last, seen = np.empty(5), np.empty(5), np.empty(4)
@@ -424,7 +424,7 @@ def along(entries, depths, stress, surface_flux, log_t, scale, zeros):
     return n
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def at_end(entries, depths, stress, surface_flux, log_t, scale, out):
     """The residual at the last depth of one trajectory, and the quantities there."""
     state, seen = np.empty(5), np.empty(4)

@@ -146,27 +146,27 @@ class Family:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
         it, and goes away from it beyond, so that a fold near to the target lies between; or they are ends of the
-        branch, at which a rough flow may be on the wrong side.
+        branch, where the rough flow may be on the wrong side.
 
         Raises:
             SolveError: where the branch could not be followed.
         """
 
         def tried(places: list[int], outward: float) -> tuple[int, Point]:
-            """The first that is on its side, where the quantity goes away from the target outwards; or is on its
-            side at least; or is an end of the branch."""
-            second = at_end = None
+            """The first that is on its side, where the quantity goes away from the target outwards; or an end of the
+            branch that is on the other side; or one that is on its side at least."""
+            second = None
             for i in places:
                 point, off = self.solved(i, tolerance), float(self.macroscopic[i, which]) - target
                 if point is None:
                     continue
                 if (point.m[which] >= target) != (off >= 0.0):
-                    at_end = (i, point) if i in (0, whole) else at_end
+                    if i in (0, whole):
+                        return i, point
                     continue
                 if outward * point.tangent[which] * (1.0 if off >= 0.0 else -1.0) > 0.0:
                     return i, point
                 second = second or (i, point)
-            second = second or at_end
             if second is None:
                 raise SolveError("a flow seen in the search could not be solved: ask for a larger tolerance")
             return second
