@@ -91,14 +91,20 @@ def closures(nu: np.ndarray, room: np.ndarray, e: float, closure: str) -> tuple[
     return g0, compression, g1_slope, g2, g3, g4, 12.0 / root_pi * (1.0 - e**2) * g0
 
 
+def of_logit(logit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """nu and 1 - nu/nu* of ln(nu/(nu* - nu)), both to rounding."""
+    return PACKED / (1.0 + np.exp(-logit)), 1.0 / (1.0 + np.exp(logit))
+
+
 def functions(chute: Chute, kappa: np.ndarray) -> np.ndarray:
     """The seven functions of kappa = ln g1, (len(kappa), 7)."""
     low, high = np.full_like(kappa, -60.0), np.full_like(kappa, 60.0)
     for _ in range(64):
         middle = 0.5 * (low + high)
-        nu, room = PACKED / (1.0 + np.exp(-middle)), 1.0 / (1.0 + np.exp(middle))
+        nu, room = of_logit(middle)
         above = np.log(nu * (1.0 + 2.0 * (1.0 + chute.e) * nu * room ** (-2.5 * PACKED))) > kappa
         low, high = np.where(above, low, middle), np.where(above, middle, high)
+    nu, room = of_logit(0.5 * (low + high))
     s, r = chute.slope, chute.r
     g0, compression, g1_slope, g2, g3, g4, g5 = closures(nu, room, chute.e, chute.closure)
     g1 = nu * compression

@@ -261,7 +261,7 @@ def run_corners(share: float) -> Tally:
     for chute, name, value in CORNERS[:: max(1, round(1.0 / share))]:
         tally.questions += 1
         try:
-            ask(chute, name, value, tally, surface_temperature=(1e-6, 1e5))
+            tally.flows += len(ask(chute, name, value, tally, surface_temperature=(1e-6, 1e5)))
         except SolveError as error:
             tally.wrong.append(f"refused: {chute}, {name}={value!r}: {error}")
         if tally.seconds[-1] > LIMIT:
