@@ -1,1 +1,1 @@
-"""Studies of very many chutes: designs, an engine that treats them in batches, and a store that survives interruptions."""
+"""Studies of very many chutes: designs, an engine that treats them in batches, and a store that survives all ends."""
