@@ -40,6 +40,7 @@ from chuteflow.maps.columns import Column, Part
 from chuteflow.maps.domain import COARSEST, FINEST, LARGEST_SIZE
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
 from chuteflow.maps.plane import CODES, HOT_CODES
+from chuteflow.steady.quantities import Scales
 
 TITLE = "domains of existence of steady, fully developed flows of grains down a chute"
 KIND, FORMAT = "domain", 1
@@ -87,6 +88,18 @@ def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]
             "M_max": found.searched.largest_holdup,
         },
     }
+
+
+def in_si(found: Domain, scales: Scales | None) -> dict[str, Any]:
+    """What an object has beside it with ``scales``: its temperatures in SI units, null where the slope is an axis, with
+    which they change."""
+    if scales is None:
+        return {}
+    plane = found.plane
+    one = "slope" not in (plane.x.name, plane.y.name)
+    factor = scales.factor("surface_temperature", plane.chute.slope)
+    temperatures = [value * factor for value in plane.temperatures]
+    return {"temperatures_si": temperatures if one else None, **contract.units_object(scales, ("surface_temperature",))}
 
 
 def shares(found: Domain) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from chuteflow.io.tables import number
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import SCALED, Scales
 from chuteflow.steady.validity import WORDS
 
 _DENSITIES = {
@@ -107,5 +107,10 @@ def _fluxes(count: Count, factor: float) -> str:
     return f"Q above {low}" if count.high == math.inf else f"Q from {low} to {high}"
 
 
+def amount(name: str, value: float, chute: Chute, scales: Scales | None) -> str:
+    """A dimensionless value of the quantity ``name``, with its unit where there are ``scales``."""
+    return f"{number(value * factor(name, chute, scales))}{_unit(name, scales)}"
+
+
 def _unit(name: str, scales: Scales | None) -> str:
-    return "" if scales is None else f" {NUMBERS[name].unit}"
+    return "" if scales is None or SCALED[name].unit == "1" else f" {SCALED[name].unit}"

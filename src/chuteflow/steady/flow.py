@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -183,9 +184,14 @@ class Flow:
     @cached_property
     def depth(self) -> float:
         """Height above which nu is below 1 % of its maximum, or of the interface where it stays above."""
+        return float(self._heights(np.array([self._share_above_depth]))[0])
+
+    @cached_property
+    def _share_above_depth(self) -> float:
+        """Share of the mass hold-up above the depth: 0 where that is the height of the interface."""
         target = np.log(CUTOFF * self.largest_volume_fraction)
         if self._model.surface_stress and self._log_density(0.0) >= target:
-            return self.interface_height
+            return 0.0
         low, high = np.log(_SMALLEST_SHARE), np.log(self._share_of_largest[0])
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -193,7 +199,27 @@ class Flow:
                 low = middle
             else:
                 high = middle
-        return float(self._heights(np.array([np.exp(0.5 * (low + high))]))[0])
+        return float(np.exp(0.5 * (low + high)))
+
+    @property
+    def mean_velocity(self) -> float:
+        """Q/M, the velocity of the grains averaged over their mass."""
+        return self.mass_flux / self.mass_holdup
+
+    @property
+    def surface_velocity(self) -> float:
+        """u far above (half-line) or at the interface."""
+        return float(self._antiderivatives[1][0])
+
+    @property
+    def mean_volume_fraction(self) -> float:
+        """nu averaged over heights from the base to the depth."""
+        return self.mass_holdup * (1.0 - self._share_above_depth) / self.depth
+
+    @property
+    def froude_number(self) -> float:
+        """Mean velocity over sqrt(g cos(theta) depth)."""
+        return self.mean_velocity / math.sqrt(self.depth)
 
     @cached_property
     def interior(self) -> str:

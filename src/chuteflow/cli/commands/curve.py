@@ -28,8 +28,7 @@ _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6
 @click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
 @options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
 @options.search_options
-@options.output_options
-@options.scale_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Trace, print, save and draw."""
     chute = options.chute(given)
@@ -40,7 +39,7 @@ def command(**given: Any) -> None:
     from chuteflow.branches.curve import curve
 
     points = {} if given["points"] is None else {"points": given["points"]}
-    found = curve(chute, **points, **options.search(given))
+    found = curve(chute, **points, **options.search(given, chute.slope, scales))
     judged = _judged(found, given["samples"]) if given["stability"] else None
     if judged is not None:
         found = judged.curve

@@ -41,8 +41,7 @@ _COLUMNS = (
 @options.chute_options
 @options.condition_options
 @options.search_options
-@options.output_options
-@options.scale_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Solve, print, save and draw."""
     chute = options.chute(given)
@@ -51,7 +50,7 @@ def command(**given: Any) -> None:
     options.require_outputs(given)
     from chuteflow.branches.enumeration import flows
 
-    found = flows(chute, **condition, **options.search(given))
+    found = flows(chute, **condition, **options.search(given, chute.slope, scales))
     if given["as_json"]:
         from chuteflow.io import contract
 
