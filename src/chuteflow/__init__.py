@@ -9,11 +9,14 @@ if TYPE_CHECKING:
     from chuteflow.bifurcations.boundary import Boundary, BoundarySet, Turning, boundary
     from chuteflow.branches.curve import curve
     from chuteflow.branches.enumeration import flows
+    from chuteflow.branches.nearest import Nearest, nearest
     from chuteflow.branches.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
+    from chuteflow.io.chute_file import read_chute
     from chuteflow.io.files import load, save
     from chuteflow.maps.domain import Domain, domain
     from chuteflow.stability.verdict import Stability, stability_of
+    from chuteflow.steady.cases import Case, case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.hot import HotModel, hot
@@ -26,6 +29,7 @@ _HOMES = {
     "Boundary": "bifurcations.boundary",
     "BoundarySet": "bifurcations.boundary",
     "Branch": "branches.results",
+    "Case": "steady.cases",
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "branches.results",
@@ -33,6 +37,7 @@ _HOMES = {
     "Flow": "steady.flow",
     "FlowSet": "branches.results",
     "InputError": "errors",
+    "Nearest": "branches.nearest",
     "Profile": "steady.flow",
     "QUANTITIES": "steady.quantities",
     "Quantity": "steady.quantities",
@@ -44,11 +49,14 @@ _HOMES = {
     "boundary": "bifurcations.boundary",
     "Stability": "stability.verdict",
     "HotModel": "steady.hot",
+    "case": "steady.cases",
     "curve": "branches.curve",
     "domain": "maps.domain",
     "flows": "branches.enumeration",
     "hot": "steady.hot",
     "load": "io.files",
+    "nearest": "branches.nearest",
+    "read_chute": "io.chute_file",
     "save": "io.files",
     "stability_of": "stability.verdict",
 }
@@ -58,6 +66,7 @@ __all__ = [
     "Boundary",
     "BoundarySet",
     "Branch",
+    "Case",
     "Chute",
     "ChuteflowError",
     "Curve",
@@ -66,6 +75,7 @@ __all__ = [
     "FlowSet",
     "HotModel",
     "InputError",
+    "Nearest",
     "Profile",
     "Quantity",
     "Scales",
@@ -76,11 +86,14 @@ __all__ = [
     "Turning",
     "__version__",
     "boundary",
+    "case",
     "curve",
     "domain",
     "flows",
     "hot",
     "load",
+    "nearest",
+    "read_chute",
     "save",
     "stability_of",
 ]

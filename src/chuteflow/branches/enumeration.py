@@ -36,7 +36,8 @@ _MOST_DEEPER = 4
 _SAME = 1e-9
 #: The range reaches this factor beyond a flow that was found just outside.
 _ASIDE = 1.2
-_QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
+#: Places of the conditions among ln Q, ln h, ln M and ln T_surface.
+QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
 @on_one_thread
@@ -68,7 +69,7 @@ def flows(
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
     """
-    which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
+    which, value = asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
@@ -121,14 +122,19 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
     return _Search(within, found, inside, beyond, lost, search(problem, within))
 
 
-def _asked(given: dict[str, float | None]) -> tuple[int, float]:
+def asked(given: dict[str, float | None]) -> tuple[int, float]:
+    """The place of the one quantity that is given among the macroscopic ones, and its value.
+
+    Raises:
+        InputError: for none or several, or a value out of range.
+    """
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) != 1:
         what = ", ".join(named) if named else "none"
         raise InputError(f"give exactly one of Q, M, h and T_surface: got {what}")
     ((name, raw),) = named.items()
     low, high = {"T_surface": WIDEST, "M": (1e-12, DEEPEST)}.get(name, (1e-12, 1e12))
-    return _QUANTITIES[name], number(name, raw, low, high)
+    return QUANTITIES[name], number(name, raw, low, high)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEM
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.branches.results import FlowSet
+    from chuteflow.branches.results import Curve, FlowSet, Searched
     from chuteflow.steady.cases import Case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
@@ -325,9 +325,10 @@ def chute(given: Mapping[str, Any]) -> Chute:
     if given["angle"] is not None:
         _require_degrees(given["angle"])
         return Chute.at_angle(given["angle"], **others)
-    slope = float(given["slope"])
+    slope: Any = given["slope"]
     require_ratio(slope)
-    return Chute(slope, **others)
+    others["slope"] = slope
+    return Chute(**others)
 
 
 def require_ratio(slope: float) -> None:
@@ -495,6 +496,38 @@ def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None 
         "largest_holdup": own(given, "largest_holdup", "mass_holdup", slope, scales),
     }
     return {name: value for name, value in arguments.items() if value is not None}
+
+
+def nearest(
+    chute: Chute, condition: Mapping[str, float], searched: Searched, scales: Scales | None
+) -> tuple[dict[str, Any], list[str]]:
+    """The nearest that has a flow where ``chute`` has none: what JSON has of it, and lines."""
+    from chuteflow.branches.nearest import nearest as look
+    from chuteflow.io import contract, words
+
+    found = look(
+        chute,
+        **condition,
+        surface_temperature=searched.surface_temperature,
+        largest_holdup=searched.largest_holdup,
+    )
+    return {"nearest_with_flow": contract.nearest_object(found, scales)}, list(words.nearest(found, scales))
+
+
+def deliver_without_flow(
+    given: Mapping[str, Any],
+    found: FlowSet | Curve,
+    condition: Mapping[str, float],
+    scales: Scales | None,
+    empty: Mapping[str, Any],
+) -> None:
+    """Print that there is no flow, and what is nearest; the object is ``empty`` with the chute and the reason."""
+    from chuteflow.io import contract, words
+
+    near, lines = nearest(found.chute, condition, found.searched, scales)
+    content = {"chute": contract.chute_object(found.chute), **empty, "reason": found.reason, **near}
+    text = [words.in_own_units(f"no flow: {found.reason}", scales), *lines]
+    click.echo(contract.text(content) if given["as_json"] else "\n".join(text))
 
 
 def deliver_object(

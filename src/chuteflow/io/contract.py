@@ -11,9 +11,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
 from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
-from chuteflow.parameters import BY_KEY, NAMES
+from chuteflow.parameters import BY_KEY, CONDITIONS, NAMES
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE, SCALED, VALIDITY, Scales
@@ -62,7 +63,21 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
     }
 
 
+def nearest_object(found: Nearest, scales: Scales | None = None) -> dict[str, Any]:
+    """The nearest values that have a flow, null where none of those examined has one."""
+    values: dict[str, Any] = {SHORT[name]: value for name, value in found.parameters.items()}
+    if found.quantity is not None:
+        scale = factor(CONDITIONS[found.quantity].quantity, found.chute, scales)
+        values[found.quantity] = None if found.value is None else found.value * scale
+    return values | {"examined": {SHORT[name]: list(ends) for name, ends in found.examined.items()}}
+
+
 def chute_object(chute: Chute) -> dict[str, float | str]:
+    """The parameters of a chute, and its angle in degrees."""
+    return chute_parameters(chute) | {"angle": chute.angle}
+
+
+def chute_parameters(chute: Chute) -> dict[str, float | str]:
     """The parameters of a chute, from which it is made again."""
     values = chute.as_dict()
     named = {short: values[name] for short, name in PARAMETERS.items()}

@@ -60,12 +60,10 @@ def command(**given: Any) -> None:
     condition: dict[str, Any] = options.condition(given, chute, scales)
     kx, ky = (options.own(given, name, "wavenumber", chute.slope, scales) for name in ("kx", "ky"))
     from chuteflow.branches.enumeration import flows
-    from chuteflow.io import contract
 
     found = flows(chute, **condition)
     if not len(found):
-        empty = {"chute": contract.chute_object(chute), "flow": None, "reason": found.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        options.deliver_without_flow(given, found, condition, scales, {"flow": None})
         return
     flow = options.chosen(found, given["which"])
     from chuteflow.io.growth_records import wave_object, wave_rows

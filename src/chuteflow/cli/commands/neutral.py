@@ -51,12 +51,10 @@ def command(**given: Any) -> None:
     scales = options.scales(given)
     within: dict[str, Any] = {"surface_temperature": _TEMPERATURES, **options.search(given, chute.slope, scales)}
     from chuteflow.branches.curve import curve
-    from chuteflow.io import contract
 
     traced = curve(chute, points=_FLOWS, **within)
     if not traced.branches:
-        empty = {"chute": contract.chute_object(chute), "flows": None, "reason": traced.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {traced.reason}")
+        options.deliver_without_flow(given, traced, {}, scales, {"flows": None})
         return
     from chuteflow.io.growth_records import family_object, family_rows
     from chuteflow.stability.planes import family_map

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,8 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.branches.results import FlowSet
     from chuteflow.stability.layer import Layer
     from chuteflow.stability.relaxation import Moment, Outcome
-    from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
@@ -54,7 +52,7 @@ _EPILOG = (
 @options.output_options(_SAVED)
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
-    from chuteflow.io import contract
+    from chuteflow.branches.enumeration import flows
     from chuteflow.stability.relaxation import outcome
 
     options.require_outputs(given, _SAVED)
@@ -64,10 +62,10 @@ def command(**given: Any) -> None:
     duration = 2000.0 if asked is None else asked
     if not 0.0 < duration <= 1e8:
         raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
-    found = _found(given, chute, scales)
+    condition: dict[str, Any] = options.condition(given, chute, scales)
+    found = flows(chute, **condition)
     if not len(found):
-        empty = {"chute": contract.chute_object(found.chute), "flows": [], "reason": found.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        options.deliver_without_flow(given, found, condition, scales, {"flows": []})
         return
     flow = options.chosen(found, given["which"])
     layer, start = _start(flow, given["heat"], given["push"])
@@ -81,13 +79,6 @@ def command(**given: Any) -> None:
         partial(_rows, content),
         partial(_plotted, flow, moments, end, scales),
     )
-
-
-def _found(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> FlowSet:
-    from chuteflow.branches.enumeration import flows
-
-    asked: dict[str, Any] = options.condition(given, chute, scales)
-    return flows(chute, **asked)
 
 
 def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:

@@ -77,13 +77,14 @@ def command(as_json: bool, **given: Any) -> None:
 
     check_wavenumbers(*(0.0 if k is None else k for k in (kx, ky)))
     found = flows(chute, **condition, **search)
+    near, lines = ({}, []) if len(found) else options.nearest(chute, condition, found.searched, scales)
     answers = [_answer(flow, kx, ky, count) for flow in found]
     if as_json:
         from chuteflow.io import contract, stability_records
 
-        answer = contract.text(stability_records.answers_object(found, answers, scales=scales))
+        answer = contract.text(stability_records.answers_object(found, answers, scales=scales) | near)
     else:
-        answer = "\n".join(_report(found, answers, scales))
+        answer = "\n".join(_report(found, answers, lines, scales))
 
     def plotted() -> Figure:
         from chuteflow.plotting.stability_plot import plot_modes
@@ -125,7 +126,7 @@ def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path
     )
 
 
-def _report(found: FlowSet, answers: Sequence[Answer], scales: Scales | None) -> Iterator[str]:
+def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
     yield words.chute(found.chute)
@@ -133,6 +134,7 @@ def _report(found: FlowSet, answers: Sequence[Answer], scales: Scales | None) ->
         yield words.scales(scales)
     if not answers:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
     else:
         columns = [*contract.PLACE]
         head = [["", *cells, "", *rest] for cells, rest in zip(tables.heading(columns, scales), _HEADING, strict=False)]
