@@ -61,7 +61,7 @@ def test_the_environment_names_a_case_and_options_override_it(run, monkeypatch):
     _, out, _ = run("hot --case paper-productive --json")
     assert json.loads(out)["chute"]["e"] == 0.9
     _, out, _ = run("hot --angle 20 --json")
-    assert json.loads(out)["chute"]["angle"] == pytest.approx(20.0, rel=1e-12)
+    assert json.loads(out)["chute"]["slope"] == pytest.approx(math.tan(math.radians(20.0)), rel=1e-12)
 
 
 def test_a_file_describes_a_chute(run, file, monkeypatch):

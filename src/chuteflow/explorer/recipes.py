@@ -9,7 +9,7 @@ from chuteflow.steady.quantities import Scales
 
 def recipes(chute: Chute, flux: float, scales: Scales | None) -> dict[str, str]:
     """``command`` and ``python``: each writes the tables of profiles and of the curve that the page exports."""
-    given = contract.chute_parameters(chute)
+    given = contract.chute_object(chute)
     options = " ".join(
         f"--{short} {value if isinstance(value, str) else repr(value)}" for short, value in given.items()
     )

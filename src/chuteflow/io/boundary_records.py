@@ -27,7 +27,7 @@ def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[
     chute = contract.chute_object(found.chute)
     second = SHORT[found.second]
     return {
-        "chute": {**chute, **({"slope": None, "angle": None} if second == "slope" else {second: None})},
+        "chute": {**chute, second: None},
         "of": found.kind,
         "in": second,
         "range": list(found.bounds),

@@ -73,11 +73,6 @@ def nearest_object(found: Nearest, scales: Scales | None = None) -> dict[str, An
 
 
 def chute_object(chute: Chute) -> dict[str, float | str]:
-    """The parameters of a chute, and its angle in degrees."""
-    return chute_parameters(chute) | {"angle": chute.angle}
-
-
-def chute_parameters(chute: Chute) -> dict[str, float | str]:
     """The parameters of a chute, from which it is made again."""
     values = chute.as_dict()
     named = {short: values[name] for short, name in PARAMETERS.items()}

@@ -73,7 +73,7 @@ def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]
     names = [SHORT[plane.x.name], SHORT[plane.y.name]]
     chute = contract.chute_object(plane.chute)
     return {
-        "chute": {**chute, **dict.fromkeys([*names, *(["angle"] if "slope" in names else [])])},
+        "chute": {**chute, **dict.fromkeys(names)},
         "x": {"name": names[0], "range": [plane.x.low, plane.x.high]},
         "y": {"name": names[1], "range": [plane.y.low, plane.y.high]},
         "size": [len(found.x), len(found.y)],
@@ -149,7 +149,7 @@ def _kept(found: Domain) -> dict[str, Any]:
     kept = {
         "format": FORMAT,
         "kind": KIND,
-        "chute": contract.chute_parameters(plane.chute),
+        "chute": contract.chute_object(plane.chute),
         LAW: fingerprint_of(plane.chute),
         CLOSURE: contract.closure_object(plane.chute),
         "axes": [[axis.name, axis.low, axis.high] for axis in (plane.x, plane.y)],

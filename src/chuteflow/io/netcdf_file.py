@@ -259,7 +259,7 @@ def _write(
 
 def _described(quantity: Quantity, scales: Scales | None) -> dict[str, str]:
     return {
-        "units": "1" if scales is None else quantity.unit,
+        "units": quantity.unit_without_scales if scales is None else quantity.unit,
         "long_name": quantity.description,
         "symbol": quantity.symbol,
         "comment": f"{quantity.equation} of the paper",

@@ -21,7 +21,7 @@ from chuteflow.branches.ranges import Range
 from chuteflow.branches.results import KINDS, Branch, Cells, Curve, FlowSet, Searched, SpecialPoint
 from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError
-from chuteflow.io.contract import PARAMETERS, chute_parameters, closure_object, finite
+from chuteflow.io.contract import PARAMETERS, chute_object, closure_object, finite
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import WHOLE, Collocation
@@ -73,7 +73,7 @@ def head(result: Result, found: Sequence[Row]) -> dict[str, Any]:
     kept: dict[str, Any] = {
         "format": FORMAT,
         "kind": KIND_OF[type(result)],
-        "chute": chute_parameters(result.chute),
+        "chute": chute_object(result.chute),
         LAW: fingerprint_of(result.chute, found[0].flow.law if found else None),
         CLOSURE: closure_object(result.chute, found[0].flow.law if found else None),
     }

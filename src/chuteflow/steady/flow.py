@@ -221,6 +221,11 @@ class Flow:
         """Mean velocity over sqrt(g cos(theta) depth)."""
         return self.mean_velocity / math.sqrt(self.depth)
 
+    @property
+    def angle(self) -> float:
+        """Inclination of the chute in degrees."""
+        return self.chute.angle
+
     @cached_property
     def interior(self) -> str:
         """ "dissipative" or "productive" throughout, or "mixed"."""

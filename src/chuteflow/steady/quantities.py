@@ -26,6 +26,11 @@ class Quantity:
     equation: str
     description: str
 
+    @property
+    def unit_without_scales(self) -> str:
+        """Its unit where it is over its scale: "1", but for what has none."""
+        return "1" if any(self.dimension) else self.unit
+
 
 #: Fields over height, attributes of a profile.
 FIELDS: dict[str, Quantity] = {
@@ -168,6 +173,7 @@ NUMBERS: dict[str, Quantity] = {
             "",
             "mean velocity over sqrt(g cos(theta) depth)",
         ),
+        Quantity("angle", "angle", r"\theta", (0, 0, 0), "degree", "section 2", "inclination of the chute"),
     )
 }
 

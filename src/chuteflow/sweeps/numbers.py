@@ -37,6 +37,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
         "base_volume_fraction": lambda: of.along(flows.state).nu,
         "slip_velocity": lambda: _slip(of.along(flows.state)),
         "mean_velocity": lambda: _mean_velocity(flows),
+        "angle": lambda: np.degrees(np.arctan(of.slope)),
     }
     out: dict[str, Array] = {name: value() for name, value in plain.items() if name in names}
     rest = set(names) - set(plain)
