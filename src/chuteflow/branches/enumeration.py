@@ -6,16 +6,17 @@ that meet the condition are where the quantity takes its value (:mod:`chuteflow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
 from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import FlowSet
-from chuteflow.checks import number
+from chuteflow.branches.results import FlowSet, FlowSets
+from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST
@@ -26,6 +27,9 @@ from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 from chuteflow.threads import on_one_thread
 from chuteflow.trajectories.refining import TrajectoryGrid
+
+#: Several values of a quantity.
+Values: TypeAlias = Sequence[float] | Array
 
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
@@ -40,9 +44,8 @@ _ASIDE = 1.2
 QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
-@on_one_thread
-@np.errstate(under="ignore")
-def flows(
+@overload
+def flows(  # pyright: ignore[reportOverlappingOverload]
     chute: Chute,
     *,
     Q: float | None = None,
@@ -52,8 +55,33 @@ def flows(
     tolerance: float = TOLERANCE,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
-) -> FlowSet:
+) -> FlowSet: ...
+@overload
+def flows(
+    chute: Chute,
+    *,
+    Q: Values | None = None,
+    M: Values | None = None,
+    h: Values | None = None,
+    T_surface: Values | None = None,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> FlowSets: ...
+def flows(
+    chute: Chute,
+    *,
+    Q: float | Values | None = None,
+    M: float | Values | None = None,
+    h: float | Values | None = None,
+    T_surface: float | Values | None = None,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> FlowSet | FlowSets:
     """Every steady flow on ``chute`` with one given quantity, from hot to cold.
+
+    An array of values of the quantity gives the flows at each of them.
 
     Args:
         chute: the chute.
@@ -69,7 +97,30 @@ def flows(
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
     """
-    which, value = asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
+    given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
+    named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
+    search: dict[str, Any] = {"surface_temperature": surface_temperature, "largest_holdup": largest_holdup}
+    if not named or np.ndim(named[0][1]) == 0:
+        return _flows(chute, given, tolerance, **search)
+    name, several = named[0]
+    values = real_array(name, several)
+    if values.ndim > 1:
+        raise InputError(f"{name}: must be a number or a one-dimensional array of some")
+    each = [{**given, name: value} for value in values.tolist()]
+    sets = tuple(_flows(chute, one, tolerance, **search) for one in each)
+    return FlowSets(chute, name, tuple(values.tolist()), sets)
+
+
+@on_one_thread
+@np.errstate(under="ignore")
+def _flows(
+    chute: Chute,
+    given: Mapping[str, Any],
+    tolerance: float,
+    surface_temperature: tuple[float, float],
+    largest_holdup: float,
+) -> FlowSet:
+    which, value = asked(given)
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
@@ -122,7 +173,7 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
     return _Search(within, found, inside, beyond, lost, search(problem, within))
 
 
-def asked(given: dict[str, float | None]) -> tuple[int, float]:
+def asked(given: Mapping[str, Any]) -> tuple[int, float]:
     """The place of the one quantity that is given among the macroscopic ones, and its value.
 
     Raises:

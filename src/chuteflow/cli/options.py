@@ -284,13 +284,12 @@ search_options = _options(
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no notes on standard error.")
 
 
-def output_options(saved: Sequence[str] = SAVED, plotted: str | None = "") -> Callable[[Command], Command]:
-    """Options of the answer, whose files have endings of ``saved``; ``plotted`` says what is drawn,
-    None for nothing."""
+def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[[Command], Command]:
+    """Options of the answer, whose files have endings of ``saved``; ``plotted`` says what is drawn."""
     endings = f"{', '.join(saved[:-1])} or {saved[-1]}" if saved else ""
     return _options(
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
-        *([] if plotted is None else [_plot_option(plotted)]),
+        _plot_option(plotted),
         *([option("--save", metavar="FILE", help=f"Write everything to FILE: {endings}.")] if saved else []),
         quiet_option,
     )
@@ -535,7 +534,7 @@ def deliver_object(
     content: Any,
     report: Iterable[str],
     rows: Callable[[], Iterable[Sequence[str]]],
-    plot: Callable[[], Figure] | None,
+    plot: Callable[[], Figure],
 ) -> None:
     """Print the object ``content`` with --json, else the lines of ``report``; write it, or ``rows``, to the file that
     --save names; and draw. See :func:`deliver`.
@@ -554,7 +553,7 @@ def deliver(
     given: Mapping[str, Any],
     answer: str,
     save: Callable[[str], None],
-    plot: Callable[[], Figure] | None,
+    plot: Callable[[], Figure],
     **pictures: Callable[[], Figure],
 ) -> None:
     """Write the files that --save, --plot and options of ``pictures`` name, and print the answer.
@@ -573,9 +572,7 @@ def deliver(
             write_figure(figure(), path)
 
     failures = []
-    writers = {"save": save} | {
-        name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items() if figure
-    }
+    writers = {"save": save} | {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
     for name, write in writers.items():
         if given[name] is not None:
             try:

@@ -86,6 +86,25 @@ def _at(found: BoundarySet, region: Region, quantity: str, scales: Scales | None
     return region.value * factor(quantity, replace(found.chute, **{found.second: region.parameter}), scales)
 
 
+@style.own_settings()
+def plot_boundary(boundary: Boundary, quantity: str = "mass_flux", *, scales: Scales | None = None) -> Figure:
+    """One boundary against the second parameter, with its turning points."""
+    figure, (ax,) = style.panels(1, width=5.6, height=3.8)
+    values = _along(boundary, quantity, scales)
+    ax.plot(boundary.parameter, values, **style.stroke(0).line())
+    for turn in boundary.special:
+        y = getattr(turn.flow, quantity) * factor(quantity, turn.flow.chute, scales)
+        x = getattr(turn.flow.chute, boundary.second)
+        ax.plot([x], [y], label=f"{turn.kind}: {TURNS[turn.kind]}", **_marker(turn.kind, style.stroke(0).colour))
+    style.spread_scale(ax, "y", [values])
+    second = PARAMETERS[boundary.second]
+    style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity, scales))
+    style.caption(figure, f"{KINDS[boundary.kind]}\n{parameters(boundary.flows[0].chute, boundary.second)}")
+    if boundary.special:
+        style.legend(figure, handles=ax.get_lines()[1:], loc="outside lower center")
+    return figure
+
+
 def plot_none(found: BoundarySet) -> Figure:
     """Why there is no boundary."""
     return style.sentence(f"No boundary: {found.reason}.")

@@ -15,6 +15,7 @@ from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.numerics.roots import secants
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
 from chuteflow.steady.kinds import density_kind, interior_kind
@@ -42,7 +43,7 @@ _SMALLEST_SHARE = 1e-260
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Result):
     """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS.
 
     The normal stress is the weight of the grains above (3.2), (3.4), and the shear stress tan(theta) times that
@@ -95,7 +96,7 @@ class EnergyBudget:
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class Flow(Result):
     """A steady, fully developed flow on ``chute``.
 
     All numbers are dimensionless (lengths in grain diameters d, velocities in sqrt(g d cos theta),
@@ -116,6 +117,13 @@ class Flow:
         rows.append(("error", display.number(self.error), "estimated relative error of Q, h and M, the largest"))
         kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
         return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
+
+    def _compared(self) -> tuple[object, ...]:
+        solution = self.solution
+        return self.chute, solution.macroscopic, solution.error, solution.status.name
+
+    def _mark(self) -> bytes:
+        return self.solution.macroscopic.tobytes()
 
     @property
     def name(self) -> str:

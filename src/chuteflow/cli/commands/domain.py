@@ -135,7 +135,8 @@ def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:
 def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
     from chuteflow.io.contract import SHORT
-    from chuteflow.io.domain_records import BITS, CLASSES, shares
+    from chuteflow.io.datasets import BITS, CLASSES
+    from chuteflow.io.domain_records import shares
 
     plane = found.plane
     x, y = plane.x, plane.y

@@ -13,6 +13,8 @@ from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.hot import HotModel
     from chuteflow.steady.quantities import Scales
@@ -62,17 +64,23 @@ _DENSITIES = {
 
 @click.command("hot", help=COMMANDS["hot"], epilog=_EPILOG)
 @options.chute_options
-@options.output_options(_SAVED, None)
+@options.output_options(_SAVED, "the fields of the hot flow")
 def command(**given: Any) -> None:
     """Solve the reduced model and print."""
     chute = options.chute(given)
     scales = options.scales(given)
-    options.require_outputs({"plot": None, **given}, _SAVED)
+    options.require_outputs(given, _SAVED)
     from chuteflow.steady.hot import hot
 
-    content = _content(hot(chute), scales)
-    report = _report(hot(chute), scales)
-    options.deliver_object({"plot": None, **given}, content, report, lambda: _rows(content), None)
+    found = hot(chute)
+    content = _content(found, scales)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.hot_plot import plot_hot
+
+        return plot_hot(found)
+
+    options.deliver_object(given, content, _report(found, scales), lambda: _rows(content), plotted)
 
 
 def _content(found: HotModel, scales: Scales | None) -> dict[str, Any]:
