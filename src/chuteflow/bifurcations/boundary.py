@@ -127,14 +127,19 @@ class BoundarySet(Result, Sequence[Boundary]):
     tolerance: float
     reason: str | None
 
-    def plot(self, *, quantity: str = "mass_flux", scales: Any = None) -> Any:
-        """Draw the boundaries over the second parameter and a ``quantity``, one of those that place a flow on a curve.
+    def plot(self, *, scales: Any = None, **options: Any) -> Any:
+        """Draw the boundaries over the second parameter and a ``quantity``, one of those that place a flow on a curve;
+        the mass flux by default.
 
         Returns matplotlib's axes; see :meth:`chuteflow.result.Result.plot`.
         """
         from chuteflow.bifurcations.diagram import diagram
 
-        return from_above("plotting.axes", "plot")(diagram(self, quantity) if len(self) else self, scales=scales)
+        quantity = options.pop("quantity", "mass_flux")
+        if quantity not in PLACE:
+            raise InputError(f"quantity = {quantity!r}: choose one of {', '.join(PLACE)}")
+        shown = diagram(self, quantity) if len(self) else self
+        return from_above("plotting.axes", "plot")(shown, scales=scales, **options)
 
     @cached_property
     def incomplete(self) -> str | None:

@@ -472,7 +472,8 @@ def _of_hot(result: HotModel, scales: Scales | None = None) -> Dataset:
         raise InputError("a hot limit has factors of powers of T_inf: take it without scales")
     plain = {name: value for name, value in result.as_dict().items() if not isinstance(value, list)}
     values = {name: np.asarray(np.nan if value is None else value) for name, value in plain.items()}
-    return Dataset({name: Variable((), value) for name, value in values.items()}, result.chute.as_dict())
+    described = {name: _plain((), value, f"{name} of the hot limit") for name, value in values.items()}
+    return Dataset(described, result.chute.as_dict())
 
 
 # Studies

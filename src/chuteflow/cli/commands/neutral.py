@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
-#: Flows of the family between which others are solved, and range of surface temperatures unless another is given.
-_FLOWS, _TEMPERATURES = 80, (0.05, 50.0)
 #: Columns of a table of a neutral curve.
 _ALONG = ("mass_flux", "centre_of_mass", "surface_temperature")
 _ANGLES = {"along": 0.0, "across": 90.0}
@@ -49,10 +47,12 @@ def command(**given: Any) -> None:
     chute = options.chute(given)
     angle = _angle(given["waves"])
     scales = options.scales(given)
-    within: dict[str, Any] = {"surface_temperature": _TEMPERATURES, **options.search(given, chute.slope, scales)}
+    from chuteflow.stability.disturbed import FLOWS, TEMPERATURES
+
+    within: dict[str, Any] = {"surface_temperature": TEMPERATURES, **options.search(given, chute.slope, scales)}
     from chuteflow.branches.curve import curve
 
-    traced = curve(chute, points=_FLOWS, **within)
+    traced = curve(chute, points=FLOWS, **within)
     if not traced.branches:
         options.deliver_without_flow(given, traced, {}, scales, {"flows": None})
         return

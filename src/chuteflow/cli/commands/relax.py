@@ -16,7 +16,6 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.stability.layer import Layer
     from chuteflow.stability.relaxation import Moment, Outcome
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
@@ -53,24 +52,30 @@ _EPILOG = (
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
     from chuteflow.branches.enumeration import flows
-    from chuteflow.stability.relaxation import outcome
+    from chuteflow.stability.disturbed import DURATION, LONGEST, relax
 
     options.require_outputs(given, _SAVED)
     chute = options.chute(given)
     scales = options.scales(given)
     asked = options.own(given, "duration", "time", chute.slope, scales)
-    duration = 2000.0 if asked is None else asked
-    if not 0.0 < duration <= 1e8:
-        raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
+    duration = DURATION if asked is None else asked
+    if not 0.0 < duration <= LONGEST:
+        raise InputError(f"--duration {duration:g}: must be above 0 and at most {LONGEST:g}")
     condition: dict[str, Any] = options.condition(given, chute, scales)
     found = flows(chute, **condition)
     if not len(found):
         options.deliver_without_flow(given, found, condition, scales, {"flows": []})
         return
     flow = options.chosen(found, given["which"])
-    layer, start = _start(flow, given["heat"], given["push"])
-    moments = _followed(layer, start, duration)
-    end = outcome(layer, moments)
+    with Progress(seconds=1.0) as progress:
+        followed = relax(
+            flow,
+            temperature=given["heat"],
+            velocity=given["push"],
+            duration=duration,
+            progress=lambda time: progress.tell(f"t = {time:.6g} of {duration:.6g}"),
+        )
+    moments, end = followed.moments, followed.outcome
     content = _content(flow, moments, end, scales)
     options.deliver_object(
         given,
@@ -79,29 +84,6 @@ def command(**given: Any) -> None:
         partial(_rows, content),
         partial(_plotted, flow, moments, end, scales),
     )
-
-
-def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:
-    """The layer and its disturbed state."""
-    from chuteflow.stability.layer import Layer
-    from chuteflow.stability.relaxation import disturbed
-
-    layer = Layer.of(flow)
-    if heat is None:
-        heat = 1.1 if push is None else 1.0
-    return layer, disturbed(layer.steady(flow), temperature=heat, velocity=1.0 if push is None else push)
-
-
-def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
-    """All moments; how far it is, on a terminal, once a second."""
-    from chuteflow.stability.relaxation import relax
-
-    moments: list[Moment] = []
-    with Progress(seconds=1.0) as progress:
-        for moment in relax(layer, start, duration):
-            moments.append(moment)
-            progress.tell(f"t = {moment.time:.6g} of {duration:.6g}")
-    return moments
 
 
 def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> dict[str, Any]:
