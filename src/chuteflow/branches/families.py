@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.paths import Chord, Point, Turn, find_value, point_at, refined, turns
-from chuteflow.branches.ranges import CLOSED, Range
+from chuteflow.branches.ranges import BranchEnd, Range
 from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -61,8 +61,6 @@ _HIDDEN = 0.05
 _SAME = 1e-8
 #: A logarithm that differs by less is at its value.
 _ROUNDING = 1e-14
-#: Why a branch ends where it is lost.
-LOST = "it could not be followed further"
 #: Searches whose result is remembered.
 _REMEMBERED = 4
 
@@ -198,9 +196,9 @@ class Family:
                 pieces[-1] += refined([one, other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
-        ends = [LOST] * (2 * len(pieces))
+        ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
         if len(found) > 1 and len(pieces) == 1 and found[0] is found[-1]:
-            ends = [CLOSED, CLOSED]
+            ends = [BranchEnd.CLOSED, BranchEnd.CLOSED]
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
         return [
