@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.branches.families import LOST, trace_all
+from chuteflow.branches.families import trace_all
 from chuteflow.branches.lines import SteadyBranch
-from chuteflow.branches.ranges import Range, goes_on
+from chuteflow.branches.ranges import BranchEnd, Range
 from chuteflow.branches.results import Branch, Curve
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -73,7 +73,7 @@ def most_solved(problem: Model, within: Range, tolerance: float) -> int | None:
         ]
     except SolveError:
         return None
-    if lost or any(LOST in family.ends for family in families):
+    if lost or any(BranchEnd.LOST in family.ends for family in families):
         return None
     stretches = [sorted(pair) for along in stops for pair in pairwise(along)]
     return most_at_once(np.array(stretches)) if stretches else 0
@@ -89,7 +89,9 @@ def _beyond(branch: Branch) -> list[tuple[float, float]]:
     """Lowest and highest mass flux to which a branch may go on beyond its ends."""
     stops = _stops(branch)
     ends = ((stops[1], stops[0], branch.ends[0]), (stops[-2], stops[-1], branch.ends[1]))
-    return [(end, np.inf) if end > before else (0.0, end) for before, end, words in ends if goes_on(words)]
+    return [
+        (end, np.inf) if end > before else (0.0, end) for before, end, words in ends if not BranchEnd.of(words).is_final
+    ]
 
 
 def _stops(branch: SteadyBranch) -> list[float]:
