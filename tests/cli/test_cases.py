@@ -186,13 +186,23 @@ def test_a_range_searched_takes_units(run):
     ("words", "place", "quantity"),
     [
         ("curve --points 8", ("branches", 0, "Q"), "mass_flux"),
-        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "growth"), "growth"),
-        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "kx"), "wavenumber"),
-        ("relax --flux 3 --duration 1", ("t",), "time"),
-        ("relax --flux 3 --duration 1", ("T_base",), "base_temperature"),
+        ("relax --flux 3 --duration 0.01", ("t",), "time"),
+        ("relax --flux 3 --duration 0.01", ("T_base",), "base_temperature"),
         ("compare-closures --with lun --flux 3", ("closures", 0, "flows", 0, "U"), "mean_velocity"),
-        ("boundary --slope 0.29:0.3 --samples 2 --search-temperature 0.1:10", ("boundaries", 0, "T_surface"), None),
         ("hot", ("M",), "mass_holdup"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "growth"), "growth"),
+                ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "kx"), "wavenumber"),
+                ("growth --flux 3 --kx 0:0.02 --ky 0:0.02 --size 4x4", ("kx",), "wavenumber"),
+                (
+                    "boundary --slope 0.29:0.3 --samples 2 --search-temperature 0.1:10",
+                    ("boundaries", 0, "T_surface"),
+                    None,
+                ),
+            )
+        ),
     ],
 )
 def test_si_scales_what_every_command_prints(run, words, place, quantity):
@@ -256,6 +266,7 @@ WITHOUT = {
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_accepts_what_makes_sense(name):
     command = program.get_command(click.Context(program), name)
+    assert command is not None
     accepted = {option.removeprefix("--") for param in command.params for option in param.opts}
     wanted = {"chute", "case", "si", "json", "save", "plot", "quiet"} - set(WITHOUT.get(name, ()))
     assert wanted <= accepted
@@ -265,7 +276,7 @@ def test_every_command_accepts_what_makes_sense(name):
 # Numbers of a flow
 
 
-@pytest.mark.parametrize("surface", ["free", "interface"])
+@pytest.mark.parametrize("surface", ["free", pytest.param("interface", marks=pytest.mark.slow)])
 def test_the_numbers_that_follow_from_others(surface):
     for flow in chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface=surface), Q=3.0):
         profile = flow.sampled(20_001)
