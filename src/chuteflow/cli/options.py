@@ -208,6 +208,21 @@ def words(given: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
+def closure_names(given: Sequence[str]) -> list[str]:
+    """The closures of several --with, each once; all that there are where none is given.
+
+    Raises:
+        InputError: for a closure of another package that cannot be loaded.
+    """
+    from chuteflow.theory.laws import known_laws
+
+    if not given:
+        return list(known_laws())
+    # A comma also parts the parameters of one.
+    names = [name for text in given for name in (text.split(",") if "=" not in text else [text])]
+    return list(dict.fromkeys(name.strip() for name in names))
+
+
 def scales(given: Mapping[str, Any]) -> Scales | None:
     """The scales of the options, or None where dimensionless results are asked for.
 

@@ -153,10 +153,10 @@ def _write_numbers(file: h5netcdf.File, found: Sequence[Row], scales: Scales | N
         # There is no interface on the half-line.
         if not len(values) or np.isfinite(values).all():
             attributes = _described(quantity, scales) | {"ancillary_variables": "error status"}
-            _write(file, name, ("flow",), values, attributes)
+            write_variable(file, name, ("flow",), values, attributes)
     error = np.array([row.flow.error for row in found])
     attributes = {"units": "1", "long_name": "estimated relative error of Q, h and M, the largest"}
-    _write(file, "error", ("flow",), error, attributes)
+    write_variable(file, "error", ("flow",), error, attributes)
 
 
 def _write_kinds(file: h5netcdf.File, found: Sequence[Row]) -> None:
@@ -175,7 +175,7 @@ def _write_validity(file: h5netcdf.File, found: Sequence[Row]) -> None:
     known = [row.flow.validity for row in found]
     for name, quantity in VALIDITY.items():
         values = np.array([getattr(one, name) for one in known], dtype="f8")
-        _write(file, name, ("flow",), values, {"units": "1", "long_name": quantity.description})
+        write_variable(file, name, ("flow",), values, {"units": "1", "long_name": quantity.description})
     bits = {word: 1 << i for i, word in enumerate(WORDS)}
     attributes = {
         "long_name": "limits of the theory that are passed",
@@ -184,13 +184,13 @@ def _write_validity(file: h5netcdf.File, found: Sequence[Row]) -> None:
         "comment": "; ".join(f"{word}: {meaning}" for word, meaning in WORDS.items()),
     }
     passed = np.array([sum(bits[word] for word in one.words) for one in known], dtype="i1")
-    _write(file, "validity", ("flow",), passed, attributes)
+    write_variable(file, "validity", ("flow",), passed, attributes)
 
 
 def _write_branches(file: h5netcdf.File, found: Sequence[Row]) -> None:
     branch = np.array([row.branch for row in found], dtype="i4")
     attributes = {"long_name": "number of the family of flows", "units": "1"}
-    _write(file, "branch", ("flow",), branch, attributes)
+    write_variable(file, "branch", ("flow",), branch, attributes)
     kinds = [row.special or "none" for row in found]
     comment = "; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items())
     _write_flags(file, "special_kind", kinds, ("none", *KINDS), "kind of special point", comment)
@@ -204,7 +204,7 @@ def _write_profiles(file: h5netcdf.File, found: Sequence[Row], scales: Scales | 
         ).reshape(len(found), HEIGHTS)
         attributes = _described(quantity, scales)
         attributes |= {"positive": "up"} if name == "height" else {"coordinates": "height"}
-        _write(file, name, ("flow", "height_index"), values, attributes)
+        write_variable(file, name, ("flow", "height_index"), values, attributes)
 
 
 def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row]) -> None:
@@ -217,7 +217,7 @@ def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row])
     group.dimensions = {"unknown": sum(len(s.z) for s in solutions), "logarithm": 4}
     for name, kind in _PER_FLOW.items():
         values = [getattr(s if name == "error" else s.problem, name) for s in solutions]
-        _write(group, name, ("flow",), np.array(values, dtype=kind).reshape(-1), {})
+        write_variable(group, name, ("flow",), np.array(values, dtype=kind).reshape(-1), {})
     kinds = ("", *KINDS)
     integers = {
         "unknowns": [len(s.z) for s in solutions],
@@ -226,11 +226,11 @@ def _write_unknowns(group: h5netcdf.Group, result: Result, found: Sequence[Row])
         "special": [kinds.index(row.special) for row in found],
     }
     for name, values in integers.items():
-        _write(group, name, ("flow",), np.array(values, dtype="i4"), {})
-    _write(group, "z", ("unknown",), np.concatenate([np.empty(0), *(s.z for s in solutions)]), {})
+        write_variable(group, name, ("flow",), np.array(values, dtype="i4"), {})
+    write_variable(group, "z", ("unknown",), np.concatenate([np.empty(0), *(s.z for s in solutions)]), {})
     macroscopic = np.array([s.macroscopic for s in solutions], dtype=float).reshape(-1, 4)
     attributes = {"long_name": "ln Q, ln h, ln M, ln T_surface"}
-    _write(group, "macroscopic", ("flow", "logarithm"), macroscopic, attributes)
+    write_variable(group, "macroscopic", ("flow", "logarithm"), macroscopic, attributes)
 
 
 def _write_flags(
@@ -247,12 +247,15 @@ def _write_flags(
         "flag_meanings": " ".join(meanings),
         **({"comment": comment} if comment else {}),
     }
-    _write(group, name, ("flow",), np.array([meanings.index(value) for value in values], dtype="i1"), attributes)
+    write_variable(
+        group, name, ("flow",), np.array([meanings.index(value) for value in values], dtype="i1"), attributes
+    )
 
 
-def _write(
+def write_variable(
     group: h5netcdf.Group, name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]
 ) -> None:
+    """A variable of ``group`` with its values and attributes."""
     variable = group.create_variable(name, dimensions, values.dtype, data=values)
     variable.attrs.update(attributes)
 
