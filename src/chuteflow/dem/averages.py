@@ -4,11 +4,11 @@
 # F the force of a contact on its upper grain, p overburden.
 
 Everything follows from sums that add over time (:class:`Sums`). The velocities of all grains are sampled in bins of
-height 0.1; fluctuations c are relative to the mean of their bin over the whole time. Of contacts, the forces F that cross a
-horizontal plane give P_xz and P_zz there, and F . (v_i + v_j)/2 less F . u the collisional heat flux: momentum and energy
-balance exactly, whatever the bins are. Dissipation and the other stresses of a contact lie at its middle. Fields are smoothed with a
-Gaussian whose standard deviation is the kernel's width, cut at three of them; the shear rate is the exact derivative of
-the smoothed velocity.
+height 0.1; fluctuations c are relative to the mean of their bin over the whole time. Of contacts, the forces F that
+cross a horizontal plane give P_xz and P_zz there, and F . (v_i + v_j)/2 less F . u the collisional heat flux: momentum
+and energy balance whatever the bins are. Dissipation and the other stresses of a contact lie at its middle. Fields are
+smoothed with a Gaussian whose standard deviation is the kernel's width, cut at three of them; the shear rate is the
+exact derivative of the smoothed velocity.
 
 The standard errors are those of the jackknife over blocks of time: each block left out once.
 """
@@ -18,15 +18,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
-
+from typing import Any
 
 import numpy as np
 
 from chuteflow.dem.contacts import MASS, PAIR_MASS
-from chuteflow.dem.output import Frame, Layers
+from chuteflow.dem.output import Array, Frame, Layers
 from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import BIN, MOMENTS
-from chuteflow.numerics.chebyshev import Array
 
 #: Width of the kernel, and the distance of the heights at which fields are given.
 KERNEL, SPACING = 0.25, 0.25
@@ -40,10 +39,11 @@ _SMALLEST_SHARE = 1e-3
 class Sums:
     """Time averages over blocks of equal length, one row each, per unit area of the base.
 
-    Over bins (b, k): ``mass``, ``moments`` (b, k, 9) times mass, ``dissipation``, ``across`` (b, k, 2) the contact parts
-    of P_xx and P_yy times the bin's height, and ``touching``, contacts; at the lower ends of bins (b, k): ``force`` (b, k, 2), of x and z, and ``work``.
-    Of the base (b,): ``base_loss``, the dissipation in its contacts. ``overlap`` (b, 2) is the sum over the contacts and the
-    largest.
+    Over bins (b, k): ``mass``, ``moments`` (b, k, 9) times mass, ``dissipation``, ``across`` (b, k, 2) the contact
+    parts of P_xx and P_yy times the bin's height, and ``touching``, contacts. At the lower ends of bins (b, k):
+    ``force``
+    (b, k, 2), of x and z, and ``work``. Of the base (b,): ``base_loss``, the dissipation in its contacts. ``overlap``
+    (b, 2) is the sum over the contacts and the largest.
     """
 
     mass: Array
@@ -78,7 +78,7 @@ class Sums:
 
 def sums_of(scene: Scene, layers: Layers, frames: Iterable[Frame]) -> Sums:
     """The sums of the blocks of ``layers``, with the frames that fall in them."""
-    blocks, bins = layers.count.shape
+    bins = layers.count.shape[1]
     mass = layers.count * MASS / scene.area
     contacts = _ContactSums(scene, layers.steps, bins)
     for frame in frames:
@@ -110,7 +110,7 @@ class _ContactSums:
                 self._add(block, contact)
 
     def _add(self, block: int, contact: Contact) -> None:
-        # A plane at (k + 1) BIN... is numbered by the bin above it.
+        # A plane is numbered by the bin above it.
         first = np.clip(np.ceil(contact.low / BIN), 0, self._bins).astype(int)
         last = np.clip(np.ceil(contact.high / BIN), 0, self._bins).astype(int)
         crossing = np.column_stack([contact.force[:, 0], contact.force[:, 2], contact.work])
@@ -144,8 +144,9 @@ class _ContactSums:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Contacts of one frame: ``force`` (n, 3) on the upper grain, ``apart`` (n, 3) from the lower to it, their heights,
-    ``work`` of the lower on the upper per time, ``loss`` of energy per time, overlaps, and whether the lower is the base."""
+    """Contacts of one frame: ``force`` (n, 3) on the upper grain, ``apart`` (n, 3) from the lower to it, their
+    heights, ``work`` of the lower on the upper per time, ``loss`` of energy per time, overlaps, and whether the lower
+    is the base."""
 
     force: Array
     apart: Array
@@ -422,7 +423,7 @@ def tenths_of(height: Array, found: Mapping[str, Array], holdup: float) -> dict[
     return out
 
 
-def jackknife(sums: Sums, values: Callable[[Sums], dict[str, Array]]) -> tuple[dict[str, Array], dict[str, Array]]:
+def jackknife(sums: Sums, values: Callable[[Sums], Mapping[str, Any]]) -> tuple[dict[str, Array], dict[str, Array]]:
     """Values of the mean of all blocks, and their standard errors by leaving out each block once."""
     whole = values(sums.mean())
     count = len(sums.mass)
@@ -431,4 +432,4 @@ def jackknife(sums: Sums, values: Callable[[Sums], dict[str, Array]]) -> tuple[d
     for name in whole:
         parts = np.array([one[name] for one in without])
         errors[name] = np.sqrt((count - 1) / count * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
-    return whole, errors
+    return {name: np.asarray(value) for name, value in whole.items()}, errors

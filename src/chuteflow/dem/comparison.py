@@ -1,4 +1,4 @@
-"""The theory beside a measured flow: its flows at the measured hold-up and flux, and its functions at the measured state.
+"""The theory beside a measured flow: its flows at the same hold-up and flux, and its functions at the measured state.
 
 # notation: nu, T, u as everywhere; p/M share of the hold-up above; g1, g2, g5 of (2.7); F1 = u_b/sqrt(T_b) of (3.15).
 
@@ -17,14 +17,14 @@ import numpy as np
 from chuteflow.branches.enumeration import flows
 from chuteflow.dem.averages import at_shares
 from chuteflow.dem.measured import Measured
+from chuteflow.dem.output import Array
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Law, reduce
 from chuteflow.theory.laws import law
 
-#: Tenths of the overburden that are compared: p/M from 0.1 to 0.8. What is nearer to the base is the layer that lies on it.
+#: Tenths of the overburden that are compared: p/M from 0.1 to 0.8. Nearer to the base is the layer that lies on it.
 COMPARED = slice(0, 7)
 _SHARES = (np.arange(1, 10) / 10.0)[COMPARED] + 0.05
 _WITHIN = (np.arange(8) + 0.5) / 80.0
@@ -102,7 +102,8 @@ class Functions:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Everything: the measured flow, the flows of the theory beside it, those of no flow with the reason, and the functions of each law."""
+    """Everything: the measured flow, the flows of the theory beside it, where there is none with the reason, and the
+    functions of each law."""
 
     measured: Measured
     candidates: tuple[Candidate, ...]
@@ -211,7 +212,7 @@ def _functions(measured: Measured, closure: str, chosen: Law, mappings: Sequence
 
 
 def _mean_ratio(name: str, ratio: Array, error: Array) -> Difference:
-    """The mean over the tenths of measured over law. Their errors are not independent: the mean of the errors is taken."""
+    """The mean over the tenths of measured over law, with the mean of their errors: they are not independent."""
     mean = float(ratio.mean())
     return Difference(name, mean, 1.0, mean - 1.0, float(error.mean()))
 
@@ -302,7 +303,8 @@ def _base_sentences(found: Comparison) -> Iterator[str]:
         rows = [(one.closure, d) for one in found.functions for d in one.differences if d.name.startswith(f"{kind},")]
         if rows:
             closure, best = min(rows, key=lambda row: abs(row[1].relative))
-            yield f"{WORDS[kind]}: nearest is {closure} with {best.name.split(', ')[1]}, {best.verdict}, {_percent(best)}"
+            by = best.name.split(", ")[1]
+            yield f"{WORDS[kind]}: nearest is {closure} with {by}, {best.verdict}, {_percent(best)}"
 
 
 def _percent(one: Difference) -> str:

@@ -56,9 +56,9 @@ class Bounds:
 class Contacts:
     """The forces between grains, and between a grain and the base.
 
-    ``stiffness`` k is the same for both; the restitutions give the dashpots, and the time step is short enough for their
-    errors in one collision to be at most ``restitution_error``. With ``friction`` mu > 0 the tangential
-    force is that of a dashpot with half the critical damping, at most mu times the normal force.
+    ``stiffness`` k is the same for both; the restitutions give the dashpots, and the time step is short enough for
+    their errors in one collision to be at most ``restitution_error``. With ``friction`` mu > 0 the tangential force is
+    that of a dashpot with half the critical damping, at most mu times the normal force.
     """
 
     stiffness: float

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from chuteflow.dem import averages, script
-from chuteflow.dem.output import Layers, read_frames, read_layers, read_totals
+from chuteflow.dem.output import Array, Layers, read_frames, read_layers, read_totals
 from chuteflow.dem.run import Run
 from chuteflow.dem.steadiness import Drift, drift, verdict
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.chute import Chute
 
 #: The fields: symbol and description. Heights are above the plane of the bumps' centres.

@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.dem.script import MOMENTS, SUMS
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array
 
+#: An array of numbers, whole numbers or truth values.
+Array = NDArray[Any]
 #: Lines before the grains of a frame.
 _HEAD = 9
 #: Numbers in a line of contacts.dump, without and with rotation.

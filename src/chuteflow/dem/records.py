@@ -23,11 +23,11 @@ from chuteflow import __version__
 from chuteflow.checks import number, number_in, shown
 from chuteflow.dem.averages import tenths_of
 from chuteflow.dem.measured import FIELDS, NUMBERS, Measured
+from chuteflow.dem.output import Array
 from chuteflow.dem.steadiness import Drift
 from chuteflow.errors import InputError
 from chuteflow.io.references import PAPER, numbers_are
 from chuteflow.io.writing import require_writable, write_whole
-from chuteflow.numerics.chebyshev import Array
 
 SAVED = (".nc", ".csv")
 #: Parameters by their names in files.
@@ -142,7 +142,8 @@ def _from_netcdf(path: Path) -> Measured:
     with h5py.File(path, "r") as file:
         if "tenth" not in file or "volume_fraction" not in file:
             raise InputError("it holds no measured flow; `chuteflow dem` writes one")
-        columns = {name: np.asarray(file[name][()], dtype=float) for name in file if hasattr(file[name], "shape")}
+        datasets: dict[str, Any] = dict(file.items())
+        columns = {name: np.asarray(found[()], dtype=float) for name, found in datasets.items()}
         attributes = {name: _plain(value) for name, value in file.attrs.items()}
 
     def part(names: Any, prefix: str = "", suffix: str = "") -> dict[str, Array]:

@@ -5,14 +5,14 @@
 
 The bumps are spheres whose centres lie in the plane z = 0, a flat wall. By (2.8) r = (s_w + d_w)/(1 + d_w), so that
 bumps on a triangular lattice are L = s_w + d_w = r (1 + d_w) apart. In the derivation of the base a bump has the area
-pi (r dbar)^2 to itself; of n bumps a unit area that gives r = 1/(dbar sqrt(pi n)) instead, 5.0 % more on a lattice. Both
-are known of a scene, and a random base has the density of bumps that the lattice of its r has.
+pi (r dbar)^2 to itself; of n bumps a unit area that gives r = 1/(dbar sqrt(pi n)) instead, 5.0 % more on a lattice.
+Both are known of a scene, and a random base has the density of bumps that the lattice of its r has.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -75,7 +75,7 @@ class Scene:
     temperature: float | None = None
     velocity: float = 0.0
     seed: int = 1
-    bounds: Bounds = Bounds()
+    bounds: Bounds = field(default_factory=Bounds)
     stiffness: float | None = None
 
     def __post_init__(self) -> None:
@@ -194,7 +194,7 @@ class Scene:
 
     def as_dict(self) -> dict[str, Any]:
         """All arguments by name, as JSON has them."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
         chute = self.chute.as_dict()
         return values | {
             "chute": {name: chute[name] for name in ("slope", "restitution", "wall_restitution", "roughness")},

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-
 from chuteflow.checks import number
 from chuteflow.dem.contacts import Contacts
 from chuteflow.dem.scene import Scene, bump_positions, starting_grains
@@ -155,8 +154,8 @@ def _settings(scene: Scene, steps: Steps) -> str:
         f"thermo {steps.line}",
         "",
         "# Means over the grains in layers of equal height, the last of them with all grains above it.",
-        f"compute layer grains chunk/atom bin/1d z 0.0 {BIN} units box bound z 0.0 {bins * BIN:g} nchunk once ids every "
-        "discard no",
+        f"compute layer grains chunk/atom bin/1d z 0.0 {BIN} units box bound z 0.0 {bins * BIN:g} nchunk once ids "
+        "every discard no",
         *(f"variable {name} atom {formula}" for name, formula in _PER_GRAIN.items()),
         f"fix layers grains ave/chunk {steps.sample} {steps.block // steps.sample} {steps.block} layer "
         f"{' '.join('v_' + name for name in MOMENTS)} norm all append {LAYERS} format ' %.10g'",

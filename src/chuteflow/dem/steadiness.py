@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.dem.output import Array
 
 #: Drifts are given over this time, and steady is below this share of the mean.
 SPAN, LIMIT = 300.0, 0.01

@@ -1,4 +1,4 @@
-"""A measured flow and the flows of the theory: profiles over profiles, and measured functions over those of each law."""
+"""A measured flow and flows of the theory: profiles over profiles, and measured functions over those of each law."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def plot_comparison(found: Comparison) -> Figure:
             profile = one.flow.at_overburden(at)
             for ax, name in zip(axes[:3], _FIELDS, strict=True):
                 (drawn,) = ax.plot(getattr(profile, name), at, **line)
-            handles.setdefault(f"{one.closure}, r by {one.mapping}", drawn)
+                handles.setdefault(f"{one.closure}, r by {one.mapping}", drawn)
     for ax in axes[:3]:
         ax.set_ylim(1.0, 0.0)
         ax.set_xlim(left=0.0)

@@ -154,7 +154,10 @@ def _report(found: Comparison) -> Iterator[str]:
     for closure, mapping, condition, reason in found.reasons:
         yield f"{closure}, r by {mapping}, same {condition}: no flow: {reason}"
     yield ""
-    yield "functions at the measured state, p/M from 0.1 to 0.8, and the base: measured less law in %, and in standard errors"
+    yield (
+        "functions at the measured state, p/M from 0.1 to 0.8, and the base: measured less law in %, and in standard "
+        "errors"
+    )
     names = list(dict.fromkeys(d.name for one in found.functions for d in one.differences))
     rows = [[one.closure, *(_cell(one.differences, name) for name in names)] for one in found.functions]
     yield tables.table([["closure", *names], *rows], words=(0,))

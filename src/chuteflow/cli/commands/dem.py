@@ -162,7 +162,18 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
     chute = options.chute({"settings": (), **given})
     named = {"overlap": "overlap", "contact_share": "contact_share", "restitution_error": "restitution"}
     bounds = Bounds(**{name: given[option] for option, name in named.items() if given[option] is not None})
-    names = "box base bumps bump_diameter friction start temperature velocity seed stiffness".split()
+    names = [
+        "box",
+        "base",
+        "bumps",
+        "bump_diameter",
+        "friction",
+        "start",
+        "temperature",
+        "velocity",
+        "seed",
+        "stiffness",
+    ]
     own = {name: given[name] for name in names if given[name] is not None}
     scene = Scene(chute, given["holdup"], bounds=bounds, **own)
     if scene.start == "hot" and given["temperature"] is None and given["velocity"] is None:
@@ -220,7 +231,8 @@ def _where_to_run(run: Run) -> str:
 
     return (
         f"{run.scene.grains} grains, {run.steps.last} steps: the input is in {run.folder}\n"
-        f"to run it there: lmp -in {START}; to go on: lmp -in {RESUME} -var from {STATES[0]} (or {STATES[1]}, the newer)\n"
+        f"to run it there: lmp -in {START}\n"
+        f"to go on: lmp -in {RESUME} -var from {STATES[0]}, or {STATES[1]} if it is the newer one\n"
         f"to read it: chuteflow dem read {run.folder}"
     )
 
@@ -262,8 +274,8 @@ def _warnings(run: Run, measured: Measured) -> Iterator[str]:
     share = measured.numbers["contact_share"]
     if scene.stiffness is None and share > bounds.contact_share:
         yield (
-            f"a grain has {share:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on contact "
-            "times: grains rest on one another, or contacts are too soft"
+            f"a grain has {share:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
+            "contact times: grains rest on one another, or contacts are too soft"
         )
     largest = measured.notes["largest_overlap"]
     if scene.stiffness is None and largest > 2.0 * bounds.overlap:
