@@ -7,7 +7,7 @@ Everything follows from sums that add over time (:class:`Sums`). The velocities 
 height 0.1; fluctuations c are relative to the mean of their bin over the whole time. Of contacts, the forces F that
 cross a horizontal plane give P_xz and P_zz there, and F . (v_i + v_j)/2 less F . u the collisional heat flux: momentum
 and energy balance whatever the bins are. Dissipation and the other stresses of a contact lie at its middle. Fields are
-smoothed with a Gaussian whose standard deviation is the kernel's width, cut at three of them; the shear rate is the
+smoothed with a Gaussian whose standard deviation is the kernel's width, cut at four of them; the shear rate is the
 exact derivative of the smoothed velocity.
 
 The standard errors are those of the jackknife over blocks of time: each block left out once.
@@ -29,6 +29,8 @@ from chuteflow.dem.script import BIN, MOMENTS
 
 #: Width of the kernel, and the distance of the heights at which fields are given.
 KERNEL, SPACING = 0.25, 0.25
+#: The kernel ends at so many of its widths.
+_CUT = 4.0
 #: Blocks that errors are told from.
 BLOCKS = 10
 #: Fields are given where this share of the hold-up lies above, at least.
@@ -263,7 +265,7 @@ def heights_of(sums: Sums, kernel: float) -> Array:
     mass = sums.mean().mass[0]
     share = np.cumsum(mass[::-1])[::-1] / mass.sum()
     # The last bin has all that is higher.
-    top = min(int(np.count_nonzero(share > _SMALLEST_SHARE)), len(mass) - 1 - math.ceil(3.0 * kernel / BIN)) * BIN
+    top = min(int(np.count_nonzero(share > _SMALLEST_SHARE)), len(mass) - 1 - math.ceil(_CUT * kernel / BIN)) * BIN
     return np.arange(SPACING, max(top, 2.0 * SPACING) + 1e-9, SPACING)
 
 
@@ -330,9 +332,7 @@ def fields_of(sums: Sums, heights: Array, kernel: float) -> dict[str, Array]:
 def _smoothing(heights: Array, centres: Array, kernel: float) -> tuple[Array, Array]:
     """The kernel (m, k) from ``centres`` to ``heights``, per unit height, and its derivative."""
     away = (heights[:, None] - centres[None, :]) / kernel
-    weight = np.where(np.abs(away) <= 3.0, np.exp(-0.5 * away**2), 0.0)
-    # What is cut off is made good, so that mass is conserved.
-    weight /= kernel * math.sqrt(2.0 * math.pi) * math.erf(3.0 / math.sqrt(2.0))
+    weight = np.where(np.abs(away) <= _CUT, np.exp(-0.5 * away**2), 0.0) / (kernel * math.sqrt(2.0 * math.pi))
     return weight, -away / kernel * weight
 
 

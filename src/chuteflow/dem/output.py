@@ -168,7 +168,8 @@ def _starts_of_blocks(content: bytes, end: int) -> Iterator[int]:
 
 
 def _lines(path: Path) -> list[str]:
+    """The lines that are whole."""
     try:
-        return path.read_text(encoding="ascii", errors="replace").splitlines()
+        return path.read_text(encoding="ascii", errors="replace").split("\n")[:-1]
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from None

@@ -142,9 +142,7 @@ def _settings(scene: Scene, steps: Steps) -> str:
         "group grains type 1",
         "neighbor 0.3 bin",
         "neigh_modify every 1 delay 0 check yes exclude group base base",
-        "pair_style granular",
-        f"pair_coeff 1 1 {_law(contacts, contacts.restitution)}",
-        f"pair_coeff * 2 {_law(contacts, contacts.wall_restitution)}",
+        *contact_lines(contacts),
         f"timestep {steps.step!r}",
         f"fix gravity grains gravity {math.hypot(1.0, slope)!r} vector {slope!r} 0 -1",
         "fix base base freeze",
@@ -188,6 +186,15 @@ _PER_GRAIN = {
     "ez": "0.5*(vx*vx+vy*vy+vz*vz)*vz",
     "height": "z",
 }
+
+
+def contact_lines(contacts: Contacts) -> list[str]:
+    """The lines of the forces between grains (type 1), and between grains and bumps (type 2)."""
+    return [
+        "pair_style granular",
+        f"pair_coeff 1 1 {_law(contacts, contacts.restitution)}",
+        f"pair_coeff * 2 {_law(contacts, contacts.wall_restitution)}",
+    ]
 
 
 def _law(contacts: Contacts, restitution: float) -> str:
