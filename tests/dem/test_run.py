@@ -142,10 +142,24 @@ def test_one_run_is_not_done_twice_at_once(small, tmp_path, fake):
     first.close()
 
 
+@posix
+def test_a_run_is_made_longer(small, tmp_path, fake):
+    fake()
+    list(go_on(prepare(tmp_path / "run", small, SCHEDULE)))
+    (tmp_path / "run" / "state.a").touch()
+    longer = prepare(tmp_path / "run", small, Schedule(settle=3.0, measure=8.0, block=1.0))
+    assert not longer.is_complete
+    list(go_on(longer))
+    assert longer.is_complete
+    assert longer.steps.last > read_record(tmp_path / "run").steps.first > longer.steps.block
+    assert "-in resume.in" in (longer.folder / "arguments.txt").read_text()
+
+
 def test_a_folder_with_another_run_or_other_files_is_left_alone(small, tmp_path):
     prepare(tmp_path / "run", small, SCHEDULE)
-    with pytest.raises(InputError, match="holds another run"):
-        prepare(tmp_path / "run", small, Schedule(settle=2.0, measure=8.0, block=1.0))
+    for other in (Schedule(settle=2.0, measure=4.0, block=0.5), Schedule(2.0, 4.0, 1.0, frame=0.1)):
+        with pytest.raises(InputError, match="holds another run"):
+            prepare(tmp_path / "run", small, other)
     with pytest.raises(InputError, match="is not empty"):
         prepare(tmp_path, small, SCHEDULE)
     with pytest.raises(InputError, match="holds no run"):

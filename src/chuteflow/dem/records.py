@@ -185,8 +185,9 @@ def _csv(measured: Measured) -> str:
     for name, one in measured.drifts.items():
         heads |= {f"{_DRIFT}{name}": one.value, f"{_DRIFT}{name}{_ERROR}": one.error}
     for name, values in measured.tenths.items():
-        heads[f"mean_{name}"] = " ".join(map(_cell, values))
-        heads[f"mean_{name}{_ERROR}"] = " ".join(map(_cell, measured.tenth_errors.get(name, np.full(9, np.nan))))
+        errors = measured.tenth_errors.get(name, np.full(9, np.nan))
+        for key, array in ((f"mean_{name}", values), (f"mean_{name}{_ERROR}", errors)):
+            heads[key] = " ".join(_cell(value) or "nan" for value in array)
     heads |= measured.notes
     for name, value in heads.items():
         out.write(f"# {name} = {_cell(value) if isinstance(value, float) else value}\n")
@@ -297,8 +298,7 @@ def _completed(heads: Mapping[str, str], columns: dict[str, Array]) -> Measured:
 
 
 def _nine(text: str) -> Array:
-    # Numbers that are not known are left empty between the spaces.
-    values = np.array([_value("a mean over a tenth", cell) for cell in text.split(" ")])
+    values = np.array([_value("a mean over a tenth", cell) for cell in text.split()])
     if values.size != 9:
         raise InputError(f"{values.size} means over tenths of the overburden: there must be 9")
     return values

@@ -12,7 +12,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,18 +71,21 @@ class Moment:
 
 
 def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) -> Run:
-    """The run in ``folder``, with its input files; one that is there already has to be the same.
+    """The run in ``folder``, with its input files; one that is there already has to be of the same scene, and goes on
+    to the end of ``schedule``.
 
     Raises:
         InputError: for a folder that holds something else or cannot be written, or a disk that is too small.
     """
     path = Path(folder)
     run = Run(path, scene, schedule)
-    record = {"chuteflow": __version__, "scene": scene.as_dict(), "schedule": asdict(schedule)}
     if (path / RECORD).exists():
         there = read_record(path)
-        if (there.scene, there.schedule) != (scene, schedule):
+        lengths = {"settle": schedule.settle, "measure": schedule.measure}
+        if there.scene != scene or replace(there.schedule, **lengths) != schedule:
             raise InputError(f"{folder} holds another run: name another folder, or remove it")
+        if there.schedule != schedule:
+            _write(run, (script.SETTINGS, script.START, script.RESUME))
         return run
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -97,10 +100,17 @@ def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) ->
             f"the run would write about {needed / 1e6:.0f} MB into {folder}, where {free / 1e6:.0f} MB are free: "
             "give a shorter --measure or a longer --frame"
         )
-    for name, text in script.files(scene, schedule).items():
-        write_whole(path / name, text)
-    write_whole(path / RECORD, json.dumps(record, indent=1) + "\n")
+    _write(run, (script.DATA, script.SETTINGS, script.START, script.RESUME))
     return run
+
+
+def _write(run: Run, names: tuple[str, ...]) -> None:
+    """Write input files, and last the record, which makes a folder that of a run."""
+    inputs = script.files(run.scene, run.schedule)
+    for name in names:
+        write_whole(run.folder / name, inputs[name])
+    record = {"chuteflow": __version__, "scene": run.scene.as_dict(), "schedule": asdict(run.schedule)}
+    write_whole(run.folder / RECORD, json.dumps(record, indent=1) + "\n")
 
 
 def read_record(folder: str | os.PathLike[str]) -> Run:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from chuteflow.dem.contacts import Bounds
-from chuteflow.dem.run import Moment, Run, go_on, prepare, read_record
+from chuteflow.dem.run import RECORD, Moment, Run, go_on, prepare, read_record
 from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import Schedule
 from chuteflow.dem.start import like_theory
@@ -38,8 +38,8 @@ SEEDS = (1, 2, 3)
 PAPER, PAPER_HOLDUPS = Chute(0.3, 0.8, 0.8, 0.6), {"A": 0.44, "B": 0.59, "C": 1.26}
 #: Errors of the restitution in one collision; they cancel over many.
 _BOUNDS = Bounds(restitution=3e-3)
-_SCHEDULE = Schedule(settle=300.0, measure=300.0)
-_BOX = (12.0, 12.0)
+_SCHEDULE = Schedule(settle=900.0, measure=300.0)
+_BOX, _SMALLER_BOX = (12.0, 12.0), (9.0, 9.0)
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,10 @@ class Case:
 
 def cases() -> Iterator[Case]:
     """All runs, in the order in which they are done: every chute once before any seed is changed."""
-    yield _hot(0, 1)
-    yield from (_hot(number, 1) for number in range(1, 10))
-    yield from _paper()
+    yield from (_hot(number, 1) for number in range(10))
     yield from (_hot(0, seed) for seed in SEEDS[1:])
     yield from _variations()
+    yield from _paper()
     yield from (_hot(number, 1, base="random") for number in RANDOM)
     yield from (_hot(number, 1) for number in range(10, len(HOT)))
     yield from (_hot(number, seed) for seed in SEEDS[1:] for number in range(1, len(HOT)))
@@ -66,7 +65,8 @@ def cases() -> Iterator[Case]:
 
 def _hot(number: int, seed: int, base: str = "triangular") -> Case:
     e, slope, holdup, roughness = HOT[number]
-    scene = Scene(Chute(slope, e, e, roughness), holdup, box=_BOX, base=base, seed=seed, bounds=_BOUNDS)
+    box = _BOX if holdup < 2.0 else _SMALLER_BOX
+    scene = Scene(Chute(slope, e, e, roughness), holdup, box=box, base=base, seed=seed, bounds=_BOUNDS)
     return Case(f"hot{number + 1:02d}-{base}-{seed}", scene)
 
 
@@ -89,9 +89,10 @@ def _variations() -> Iterator[Case]:
 def prepared(case: Case, folder: str | os.PathLike[str]) -> Run:
     """The run of a case in its folder below ``folder``; a hot start begins near the flow of the theory."""
     path = Path(folder) / case.name
-    if (path / "run.json").exists():
-        return read_record(path)
-    scene = like_theory(case.scene) if case.scene.start == "hot" else case.scene
+    if (path / RECORD).exists():
+        scene = read_record(path).scene
+    else:
+        scene = like_theory(case.scene) if case.scene.start == "hot" else case.scene
     return prepare(path, scene, case.schedule)
 
 
