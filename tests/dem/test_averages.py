@@ -59,7 +59,7 @@ def test_contacts_with_bumps_and_plane_are_losses_of_the_base(small):
 
 
 def test_two_bumps_that_touch_are_no_contact(small):
-    assert pair_contacts(small, frame([[1, 1, 0], [1.99, 1, 0]], [[0, 0, 0]] * 2, bumps=(0, 1))) is None
+    assert pair_contacts(small, frame([[1, 1, 0], [1.99, 1, 0]], [[0, 0, 0]] * 2, bumps=(0, 1))).low.size == 0
 
 
 def stratified(nu, u, T, blocks=1):

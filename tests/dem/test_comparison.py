@@ -124,14 +124,14 @@ def test_what_is_not_measured_is_not_compared(itself):
 
 def test_the_picture_shows_the_measured_profile_and_the_flows(itself):
     figure = plot_comparison(compare(itself, ["lun"]))
-    points, *lines = figure.axes[0].get_lines()
+    points, *lines = (np.asarray(line.get_xydata()).T for line in figure.axes[0].get_lines())
     share = itself.share
     good = share >= 0.02
-    np.testing.assert_allclose(points.get_xdata(), itself.fields["volume_fraction"][good])
-    np.testing.assert_allclose(points.get_ydata(), share[good])
+    np.testing.assert_allclose(points[0], itself.fields["volume_fraction"][good])
+    np.testing.assert_allclose(points[1], share[good])
     assert len(lines) == 2
     # The theory's own flow passes through the points.
-    nearest = np.interp(0.5, lines[0].get_ydata(), lines[0].get_xdata())
+    nearest = np.interp(0.5, lines[0][1], lines[0][0])
     assert nearest == pytest.approx(np.interp(0.5, share[::-1], itself.fields["volume_fraction"][::-1]), rel=1e-3)
 
 

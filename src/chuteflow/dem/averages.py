@@ -108,8 +108,7 @@ class _ContactSums:
             return
         self._frames[block] += 1
         for contact in (pair_contacts(self._scene, frame), plane_contacts(self._scene, frame)):
-            if contact is not None:
-                self._add(block, contact)
+            self._add(block, contact)
 
     def _add(self, block: int, contact: Contact) -> None:
         # A plane is numbered by the bin above it.
@@ -160,12 +159,10 @@ class Contact:
     is_base: Array
 
 
-def pair_contacts(scene: Scene, frame: Frame) -> Contact | None:
-    """The contacts of grains with one another and with bumps, or None where there are none."""
+def pair_contacts(scene: Scene, frame: Frame) -> Contact:
+    """The contacts of grains with one another and with bumps."""
     from scipy.spatial import cKDTree
 
-    if len(frame.position) < 2:
-        return None
     size = np.array([*scene.size, 0.0])
     place = frame.position.copy()
     place[:, :2] = np.mod(place[:, :2], size[:2])
@@ -180,8 +177,6 @@ def pair_contacts(scene: Scene, frame: Frame) -> Contact | None:
     reach = np.where(frame.is_bump[lower], 0.5 * (1.0 + scene.bump_diameter), 1.0)
     distance = np.sqrt(np.einsum("ij,ij->i", apart, apart))
     touching = distance < reach
-    if not touching.any():
-        return None
     lower, upper, apart = lower[touching], upper[touching], apart[touching]
     normal = apart / distance[touching, None]
     radius = np.where(frame.is_bump[lower], 0.5 * scene.bump_diameter, 0.5)
@@ -197,11 +192,9 @@ def pair_contacts(scene: Scene, frame: Frame) -> Contact | None:
     )
 
 
-def plane_contacts(scene: Scene, frame: Frame) -> Contact | None:
-    """The contacts of grains with the plane below the bumps, or None where there are none."""
+def plane_contacts(scene: Scene, frame: Frame) -> Contact:
+    """The contacts of grains with the plane below the bumps."""
     (upper,) = np.nonzero(~frame.is_bump & (frame.position[:, 2] < 0.5))
-    if not upper.size:
-        return None
     apart = np.zeros((upper.size, 3))
     apart[:, 2] = frame.position[upper, 2]
     normal = np.tile([0.0, 0.0, 1.0], (upper.size, 1))

@@ -111,8 +111,14 @@ class Comparison:
     functions: tuple[Functions, ...]
 
 
-def compare(measured: Measured, closures: Sequence[str], mappings: Sequence[str] = tuple(MAPPINGS)) -> Comparison:
-    """Compare ``measured`` with the theory under the laws ``closures`` and the ``mappings`` of the roughness.
+def compare(
+    measured: Measured,
+    closures: Sequence[str],
+    mappings: Sequence[str] = tuple(MAPPINGS),
+    conditions: Sequence[str] = ("M", "Q"),
+) -> Comparison:
+    """Compare ``measured`` with the theory under the laws ``closures`` and the ``mappings`` of the roughness: flows at
+    the same ``conditions``, hold-up M or flux Q, and functions.
 
     Raises:
         InputError: for a closure or mapping that is not known, or a chute that the run does not say.
@@ -123,7 +129,7 @@ def compare(measured: Measured, closures: Sequence[str], mappings: Sequence[str]
     reasons: list[tuple[str, str, str, str]] = []
     for name in closures:
         for mapping in known:
-            for condition in ("M", "Q"):
+            for condition in conditions:
                 found, reason = _candidates(measured, name, mapping, condition)
                 candidates += found
                 if reason is not None:

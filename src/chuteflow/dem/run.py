@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -131,7 +131,7 @@ def read_record(folder: str | os.PathLike[str]) -> Run:
         raise InputError(f"{path} is damaged, or was not written by chuteflow") from None
 
 
-def go_on(run: Run, processes: int = 1) -> Iterator[Moment]:
+def go_on(run: Run, processes: int = 1) -> Generator[Moment, None, None]:
     """Run LAMMPS from where the run is to its end, and tell how far it is.
 
     Raises:

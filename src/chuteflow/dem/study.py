@@ -38,7 +38,7 @@ SEEDS = (1, 2, 3)
 PAPER, PAPER_HOLDUPS = Chute(0.3, 0.8, 0.8, 0.6), {"A": 0.44, "B": 0.59, "C": 1.26}
 #: Errors of the restitution in one collision; they cancel over many.
 _BOUNDS = Bounds(restitution=3e-3)
-_SCHEDULE = Schedule(settle=900.0, measure=300.0)
+_SCHEDULE = Schedule(settle=300.0, measure=900.0)
 _BOX, _SMALLER_BOX = (12.0, 12.0), (9.0, 9.0)
 
 

@@ -130,6 +130,7 @@ def study_command(**given: Any) -> None:
     from chuteflow.dem import records
     from chuteflow.dem.engine import engine, require_processes
     from chuteflow.dem.measured import measure
+    from chuteflow.dem.results import thinned
     from chuteflow.dem.study import cases, prepared
 
     if given["out"] is None:
@@ -147,8 +148,29 @@ def study_command(**given: Any) -> None:
         file = os.path.join(data, f"{case.name}.csv")
         if not os.path.exists(file):
             os.makedirs(data, exist_ok=True)
-            records.save(measure(run), file)
+            records.save(thinned(measure(run)), file)
     click.echo(f"{len(every)} runs are in {data}")
+
+
+@command.command("results")
+@click.argument("folder", metavar="FOLDER")
+@click.option("--with", "closures", metavar="NAME", multiple=True, help="Closures to compare with, the first in full.")
+@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> None:
+    """Compare all measured flows in the files of FOLDER with the theory at the same hold-up."""
+    options.require_outputs({"save": None, **given})
+    from chuteflow.dem.results import CLOSURES, read_folder, table
+    from chuteflow.io import tables
+    from chuteflow.plotting.results_plot import plot_results
+
+    names = options.closure_names(closures) if closures else CLOSURES
+    with Progress(seconds=0.5) as progress:
+        found = []
+        for one in read_folder(folder, names):
+            found.append(one)
+            progress.tell(f"{len(found)} flows compared")
+    text = tables.table(table(found, names), words=(0, 5))
+    options.deliver({"save": None, **given}, text, lambda _: None, lambda: plot_results(found))
 
 
 def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
