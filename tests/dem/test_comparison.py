@@ -1,7 +1,9 @@
 """Measured flows as files and beside the theory: a flow of the theory, taken for a measured one, agrees with itself."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from chuteflow.plotting.comparison_plot import plot_comparison
 from chuteflow.steady.chute import Chute
 
 CHUTE = Chute(0.18, 0.95, 0.95, 0.63)
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def taken_from(flow, error=0.01):
@@ -240,6 +243,11 @@ def test_compare_prints_tables_words_and_json(itself, tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["run"]["steadiness"] == "steady"
     assert {one["closure"] for one in answer["flows"]} == {"lun"}
+    documented = set(re.findall(r"`([\w-]+)`", (DOCS / "reference" / "json.md").read_text(encoding="utf-8")))
+    one, law = answer["flows"][0], answer["functions"][0]
+    assert {*answer, *answer["run"], *one, *law, *one["differences"][0]} <= documented
+    files = (DOCS / "howto" / "particles.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in files for name in answer["run"]["numbers"])
     assert main(["compare", path, "--with", "lun", "--roughness", "0.4"]) == 0
     assert "no flow: roughness r = 0.4" in capsys.readouterr().out
 

@@ -11,7 +11,7 @@ from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from chuteflow.dem.comparison import Comparison, Difference
+    from chuteflow.dem.comparison import Candidate, Comparison, Difference
     from chuteflow.dem.measured import Measured
 
 _EPILOG = (
@@ -138,7 +138,10 @@ def _report(found: Comparison) -> Iterator[str]:
     )
     yield f"the run is {_steadiness(measured)}"
     yield ""
-    yield "flows of the theory: measured less theory in %, and in standard errors"
+    yield (
+        "flows of the theory: measured less theory in %, and in standard errors (of those with the same flux, the one "
+        "with the nearest hold-up)"
+    )
     header = ["closure", "r by", "same", "Q theory", *(_SYMBOLS[name] for name in _COLUMNS)]
     rows = [
         [
@@ -148,7 +151,7 @@ def _report(found: Comparison) -> Iterator[str]:
             tables.number(one.flow.mass_flux),
             *(_cell(one.differences, name) for name in _COLUMNS),
         ]
-        for one in found.candidates
+        for one in _shown(found)
     ]
     yield tables.table([header, *rows], words=(0, 1, 2)) if rows else "none has this hold-up or flux"
     for closure, mapping, condition, reason in found.reasons:
@@ -163,6 +166,18 @@ def _report(found: Comparison) -> Iterator[str]:
     yield tables.table([["closure", *names], *rows], words=(0,))
     yield ""
     yield from sentences(found)
+
+
+def _shown(found: Comparison) -> Iterator[Candidate]:
+    """The flows at the measured hold-up, and of those at the measured flux the one whose hold-up is nearest."""
+    groups: dict[tuple[str, str, str], list[Candidate]] = {}
+    for one in found.candidates:
+        groups.setdefault((one.closure, one.mapping, one.condition), []).append(one)
+    for (_, _, condition), each in groups.items():
+        if condition == "M":
+            yield from each
+        else:
+            yield min(each, key=lambda one: abs(one.flow.mass_holdup - found.measured.holdup))
 
 
 def _number(measured: Measured, name: str) -> str:

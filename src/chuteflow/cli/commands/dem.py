@@ -181,7 +181,8 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
 
     if given["holdup"] is None:
         raise InputError("missing --holdup, the mass hold-up M, for example --holdup 1.264")
-    chute = options.chute({"settings": (), **given})
+    # The base of the theory is another thing than that of the grains.
+    chute = options.chute({**given, "settings": (), "base": None})
     named = {"overlap": "overlap", "contact_share": "contact_share", "restitution_error": "restitution"}
     bounds = Bounds(**{name: given[option] for option, name in named.items() if given[option] is not None})
     names = [
