@@ -371,7 +371,15 @@ def numbers_of(sums: Sums, found: dict[str, Array], scene: Scene) -> dict[str, f
 
 
 #: Fields whose means over tenths of the overburden are given, beside the measured functions.
-_TENTHS = ("volume_fraction", "granular_temperature", "velocity", "normal_stress", "shear_stress", "dissipation")
+_TENTHS = (
+    "volume_fraction",
+    "granular_temperature",
+    "temperature_z",
+    "velocity",
+    "normal_stress",
+    "shear_stress",
+    "dissipation",
+)
 #: Points that a mean over a tenth is taken at.
 _WITHIN = (np.arange(8) + 0.5) / 80.0
 

@@ -33,6 +33,8 @@ ERRORS, SMALL = 2.0, 0.05
 MAPPINGS = {"area": "roughness_by_area", "spacing": "roughness"}
 _FIELDS = ("volume_fraction", "granular_temperature", "velocity")
 FUNCTIONS = ("g1", "g2", "g5")
+#: The equation of state with the temperature of the upward velocity alone, P_zz/(g1 T_z).
+UPWARD = "g1 by T_z"
 #: How functions and numbers are called in sentences.
 WORDS = {
     "g1": "equation of state",
@@ -213,6 +215,10 @@ def _functions(measured: Measured, closure: str, chosen: Law, mappings: Sequence
             spread = measured.tenth_errors.get("volume_fraction", np.full(9, np.nan))[COMPARED]
             errors[name] = np.hypot(own, ratios[name] * theory[f"{name}_slope"] * spread)
     found = [_mean_ratio(name, ratios[name], errors[name]) for name in ratios]
+    if UPWARD in theory and {"normal_stress", "temperature_z"} <= measured.tenths.keys():
+        own = (measured.tenths["normal_stress"] / measured.tenths["temperature_z"])[COMPARED]
+        # As large as those of T, of which T_z is a part.
+        found.insert(1, _mean_ratio(UPWARD, own / theory[UPWARD], errors["g1"]))
     found += _base_differences(measured, chosen, mappings)
     return Functions(closure, ratios, errors, tuple(found))
 
@@ -226,7 +232,8 @@ def _mean_ratio(name: str, ratio: Array, error: Array) -> Difference:
 def law_values(measured: Measured, chosen: Law) -> dict[str, Array]:
     """g1, g2 and g5 of a law in the tenths compared (7,), at the measured profiles and averaged as those were, and the
     change of the logarithm of each with nu; those alone that can be compared."""
-    names = [name for name in ("volume_fraction", "granular_temperature", "shear_stress") if name in measured.fields]
+    wanted = ("volume_fraction", "granular_temperature", "temperature_z", "shear_stress")
+    names = [name for name in wanted if name in measured.fields]
     points = _points()
     found = at_shares(measured.height, dict(measured.fields), measured.holdup, names, points.ravel())
     inner = dict(zip(names, found.reshape(-1, *points.shape), strict=True))
@@ -239,6 +246,8 @@ def law_values(measured: Measured, chosen: Law) -> dict[str, Array]:
         return (weight * values).sum(axis=1)
 
     out = {"g1": mean(g1 * T) / mean(T), "g5": mean(g5 * T**1.5) / mean(T**1.5)}
+    if "temperature_z" in inner:
+        out[UPWARD] = mean(g1 * inner["temperature_z"]) / mean(inner["temperature_z"])
     if "shear_stress" in inner:
         drag = inner["shear_stress"] / np.sqrt(T)
         out["g2"] = mean(drag) / mean(drag / g2)

@@ -11,17 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from chuteflow.dem import records
-from chuteflow.dem.comparison import Comparison, Difference, compare
+from chuteflow.dem.comparison import UPWARD, Comparison, Difference, compare
 from chuteflow.dem.measured import Measured
 from chuteflow.errors import InputError
 
 #: The laws that flows are compared with unless others are given; the first gives the columns of the table.
 CLOSURES = ("lun", "garzo-dufty-fourier")
+#: A mean temperature below which grains are at rest, and the drift over 300 time units up to which the functions of a
+#: flow that is not steady are shown.
+AT_REST, SLOW = 0.05, 0.1
 #: Heights that are kept of a run.
 HEIGHTS = 30
 #: Differences from the first law that the table shows.
 _COMPARED = (
     "g1",
+    UPWARD,
     "g2",
     "g5",
     "slip, r by area",
@@ -42,6 +46,18 @@ class Result:
     def measured(self) -> Measured:
         """The measured flow."""
         return self.comparison.measured
+
+    @property
+    def state(self) -> str:
+        """ "at rest" where hardly anything moves, else how steady it is."""
+        temperature = self.measured.numbers.get("mean_temperature", math.inf)
+        return "at rest" if temperature < AT_REST else self.measured.steadiness
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether it moves, and changes slowly enough for averages over its time to be those of one state."""
+        drifts = [abs(one.value) for one in self.measured.drifts.values()]
+        return self.state != "at rest" and max(drifts, default=0.0) < SLOW
 
     def flux_ratios(self, closure: str, mapping: str) -> list[float]:
         """Q of the theory over that of the particles, of each flow at the same hold-up, from hot to cold."""
@@ -90,7 +106,7 @@ def table(results: Sequence[Result], closures: Sequence[str] = CLOSURES) -> list
     """Rows of cells with a heading: the run, its flow, and the theory beside it."""
     header = ["run", "e", "slope", "M", "r", "state", "drift of Q", "Q", "T_mean", "nu"]
     header += [f"Q {closure[:3]}/{mapping}" for closure in closures for mapping in ("area", "spacing")]
-    header += ["g1", "g2", "g5", "slip", "heat", "slip/spacing", "heat/spacing"]
+    header += ["g1", "g1(T_z)", "g2", "g5", "slip", "heat", "slip/spacing", "heat/spacing"]
     return [header, *(_row(one, closures) for one in results)]
 
 
@@ -105,7 +121,7 @@ def _row(one: Result, closures: Sequence[str]) -> list[str]:
         *(f"{value:g}" for value in (measured.restitution, measured.slope)),
         f"{measured.holdup:.3f}",
         f"{measured.roughness:.3g}",
-        measured.steadiness,
+        one.state,
         "" if drift is None else f"{100.0 * drift.value:+.1f}±{100.0 * drift.error:.1f} %",
         f"{numbers['mass_flux']:.4g}±{errors.get('mass_flux', math.nan):.1g}",
         f"{numbers.get('mean_temperature', math.nan):.3g}",

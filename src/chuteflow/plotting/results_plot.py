@@ -33,9 +33,11 @@ def plot_results(results: Sequence[Result]) -> Figure:
     colours = {e: style.stroke(i).colour for i, e in enumerate(values)}
     for one in results:
         look = _look(one, colours)
-        _functions(axes[:3], one, look)
-        _base(axes[3:5], one, look)
-        _fluxes(axes[5], one, look)
+        if one.is_slow:
+            _functions(axes[:3], one, look)
+            _base(axes[3:5], one, look)
+        if one.state != "at rest":
+            _fluxes(axes[5], one, look)
     for ax, name in zip(axes[:3], FUNCTIONS, strict=True):
         ax.axhline(1.0, color=style.GREY, linewidth=0.6)
         ax.set_xlim(left=0.0)
@@ -55,11 +57,7 @@ def plot_results(results: Sequence[Result]) -> Figure:
 
 def _look(one: Result, colours: dict[float, str]) -> dict[str, Any]:
     colour = colours[one.measured.restitution]
-    return {"color": colour, "markersize": 3.0, "linestyle": "none", "alpha": 1.0 if _is_steady(one) else _PALE}
-
-
-def _is_steady(one: Result) -> bool:
-    return one.measured.steadiness == "steady"
+    return {"color": colour, "markersize": 3.0, "linestyle": "none", "alpha": 1.0 if one.state == "steady" else _PALE}
 
 
 def _functions(axes: Sequence[Axes], one: Result, look: dict[str, Any]) -> None:
@@ -101,5 +99,8 @@ def _key(figure: Figure, results: Sequence[Result], colours: dict[float, str]) -
     ]
     key.append(Line2D([], [], color=style.BLACK, marker="o", alpha=_PALE, label="not shown to be steady", **plain))
     closure = results[0].comparison.functions[0].closure
-    style.caption(figure, f"{len(results)} simulations over closure {closure}; above: $p/M$ from 0.1 to 0.8")
+    still = sum(one.state == "at rest" for one in results)
+    style.caption(
+        figure, f"{len(results)} simulations over closure {closure}, {still} at rest; above: $p/M$ from 0.1 to 0.8"
+    )
     style.legend(figure, handles=key, loc="outside lower center", ncols=4)
