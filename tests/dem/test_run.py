@@ -143,6 +143,19 @@ def test_one_run_is_not_done_twice_at_once(small, tmp_path, fake):
 
 
 @posix
+def test_a_run_whose_grains_have_come_to_rest_is_at_its_end(small, tmp_path, fake):
+    it = prepare(tmp_path / "run", small, Schedule(settle=1.0, measure=9.0, block=1.0))
+    fake(share=1.0)
+    text = (tmp_path / "fake").read_text()
+    (tmp_path / "fake").write_text(text.replace("1 1 1 1 1 1", "0 1 1e-12 1e-12 0 0").replace("print(says)", "input()"))
+    moments = list(go_on(it))
+    assert it.is_at_rest
+    assert it.is_complete
+    assert moments[-1].step < it.steps.last
+    assert list(go_on(it)) == []
+
+
+@posix
 def test_a_run_is_made_longer(small, tmp_path, fake):
     fake()
     list(go_on(prepare(tmp_path / "run", small, SCHEDULE)))

@@ -29,6 +29,8 @@ from chuteflow.io.writing import write_whole
 RECORD, LOCK = "run.json", "run.lock"
 #: Bytes of a disk that are left free.
 _SPARE = 30_000_000
+#: Grains are at rest where the mean squares of their velocities are below this; so many blocks of it are measured.
+_STILL, _RESTING = 1e-9, 4
 #: Lines of output that are kept, to tell a failure from.
 _KEPT = 200
 _STEP = re.compile(r"\s*(\d+)\s+[-\d.e+]+")
@@ -56,9 +58,18 @@ class Run:
         return 0
 
     @property
+    def is_at_rest(self) -> bool:
+        """Whether no grain moves any more, and that was measured."""
+        with suppress(InputError, ValueError):
+            steps, totals = read_totals(self.folder / script.TOTALS)
+            enough = self.steps.first + _RESTING * self.steps.block
+            return len(steps) > 0 and steps[-1] >= enough and totals[-1, 2:4].max() < _STILL
+        return False
+
+    @property
     def is_complete(self) -> bool:
-        """Whether it has come to its end."""
-        return self.done >= self.steps.last
+        """Whether it has come to its end, or its grains to rest."""
+        return self.done >= self.steps.last or self.is_at_rest
 
 
 @dataclass(frozen=True)
@@ -190,6 +201,8 @@ def _watched(run: Run, chosen: Engine, arguments: list[str]) -> Iterator[Moment]
                 yield Moment(step, steps.last, step * steps.step)
                 if shutil.disk_usage(run.folder).free < _SPARE:
                     raise EngineError(f"the disk is almost full: stopped; the data in {run.folder} are kept")
+                if step % steps.block == 0 and run.is_at_rest:
+                    return
         code = child.wait()
     output = "".join(lines)
     if code == 0 and run.is_complete:
