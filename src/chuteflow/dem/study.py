@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from chuteflow.dem.contacts import Bounds
-from chuteflow.dem.run import RECORD, Moment, Run, go_on, prepare, read_record
+from chuteflow.dem.run import RECORD, Run, prepare, read_record
 from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import Schedule
 from chuteflow.dem.start import like_theory
@@ -94,13 +94,3 @@ def prepared(case: Case, folder: str | os.PathLike[str]) -> Run:
     else:
         scene = like_theory(case.scene) if case.scene.start == "hot" else case.scene
     return prepare(path, scene, case.schedule)
-
-
-def carried_out(folder: str | os.PathLike[str], processes: int = 1) -> Iterator[tuple[Case, Run, Moment | None]]:
-    """Do what is left of the study in ``folder``, and tell how far it is: each case with moments while it runs, and
-    with None once it is complete."""
-    for case in cases():
-        run = prepared(case, folder)
-        for moment in go_on(run, processes):
-            yield case, run, moment
-        yield case, run, None
