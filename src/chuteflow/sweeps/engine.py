@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.enumeration import flows as search
+from chuteflow.branches.enumeration import flows_within
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
-from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
@@ -26,7 +26,11 @@ from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
 
-_WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
+_WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
+#: Down to this hold-up columns are taken to lose no flows; the least at which they lost some is 4.79.
+_SHALLOW = 3.0
+#: Trajectories are followed to where their flux by shear is so many times that asked for.
+_FURTHER = 3.0
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
 _RESTITUTIONS = 257
 #: What a calculation may end with that is no reason to stop the others.
@@ -78,10 +82,10 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     valid &= ~other
     for closure, surface, members in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, members)
-        # Surface temperatures that are given are followed down one by one; no family of flows has to be found.
-        winds = batch.winding() if study.condition != "T_surface" else np.zeros(len(batch), dtype=bool)
+        value = out.parameters[study.condition][members]
+        winds = _may_lose_flows(study, batch, value)
         others = np.flatnonzero(~winds)
-        solved = _solved(study, batch.take(others), out.parameters[study.condition][members[others]])
+        solved = _solved(study, batch.take(others), value[others])
         _fill(study, out, members[others], solved)
         for point in [*members[winds].tolist(), *members[others[solved.unsettled]].tolist()]:
             _fill_singly(study, out, point, failures)
@@ -90,6 +94,17 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
         _fill_reasons(out, batch, members)
     told = {first + i: why for i, why in sorted(failures.items())}
     return replace(out, failures=told, singly=singly, winding=winding)
+
+
+def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
+    """The lanes on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
+
+    Given surface temperatures are followed down one by one, so that no family of flows has to be found; a given hold-up
+    need not be followed further.
+    """
+    if study.condition == "T_surface":
+        return np.zeros(len(batch), dtype=bool)
+    return batch.winding() & (value > _SHALLOW if study.condition == "M" else True)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
@@ -252,14 +267,18 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     p = out.parameters
     slope, e, ew, roughness = (float(p[name][point]) for name in BY_KEY)
     surface, closure = SURFACES[int(p["surface"][point])], study.laws[int(p["closure"][point])]
-    condition = {study.condition: float(p[study.condition][point])}
+    base = study.bases[int(p["base"][point]) if "base" in p else 0]
+    value = float(p[study.condition][point])
     try:
-        found = search(
-            Chute(slope, e, ew, roughness, surface, closure, study.bases[int(p["base"][point]) if "base" in p else 0]),
-            **condition,
-            tolerance=study.tolerance,
-            surface_temperature=study.surface_temperature,
-            largest_holdup=study.largest_holdup,
+        found = flows_within(
+            Chute(slope, e, ew, roughness, surface, closure, base),
+            _WHICH[study.condition],
+            value,
+            study.tolerance,
+            study.surface_temperature,
+            # Of this chute nothing else is asked.
+            min(study.largest_holdup, value) if study.condition == "M" else study.largest_holdup,
+            largest_flux=_FURTHER * value if study.condition == "Q" else np.inf,
         )
     except _FAILURES as error:
         out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER
