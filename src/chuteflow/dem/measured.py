@@ -196,6 +196,7 @@ def _notes(run: Run, kernel: float, blocks: int, largest_overlap: float) -> dict
         "start_temperature": scene.temperature or 0.0,
         "start_velocity": scene.velocity,
         "seed": scene.seed,
+        "comes_to_rest": "yes" if run.is_at_rest else "no",
         "stiffness": scene.contacts.stiffness,
         "contact_time": scene.contacts.duration,
         "time_step": run.steps.step,

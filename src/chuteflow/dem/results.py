@@ -17,9 +17,9 @@ from chuteflow.errors import InputError
 
 #: The laws that flows are compared with unless others are given; the first gives the columns of the table.
 CLOSURES = ("lun", "garzo-dufty-fourier")
-#: A mean temperature below which grains are at rest, and the drift over 300 time units up to which the functions of a
-#: flow that is not steady are shown.
-AT_REST, SLOW = 0.05, 0.1
+#: A mean temperature below which a flow is cold, layers that slide over one another, and the drift over 300 time units
+#: up to which the functions of a flow that is not steady are shown.
+COLD, SLOW = 0.05, 0.1
 #: Heights that are kept of a run.
 HEIGHTS = 30
 #: Differences from the first law that the table shows.
@@ -49,15 +49,17 @@ class Result:
 
     @property
     def state(self) -> str:
-        """ "at rest" where hardly anything moves, else how steady it is."""
+        """ "at rest" where it comes to rest, "cold" where grains move and are hardly agitated, else how steady it is."""
+        if self.measured.notes.get("comes_to_rest") == "yes":
+            return "at rest"
         temperature = self.measured.numbers.get("mean_temperature", math.inf)
-        return "at rest" if temperature < AT_REST else self.measured.steadiness
+        return "cold" if temperature < COLD else self.measured.steadiness
 
     @property
     def is_slow(self) -> bool:
         """Whether it moves, and changes slowly enough for averages over its time to be those of one state."""
         drifts = [abs(one.value) for one in self.measured.drifts.values()]
-        return self.state != "at rest" and max(drifts, default=0.0) < SLOW
+        return self.state not in ("at rest", "cold") and max(drifts, default=0.0) < SLOW
 
     def flux_ratios(self, closure: str, mapping: str) -> list[float]:
         """Q of the theory over that of the particles, of each flow at the same hold-up, from hot to cold."""
