@@ -22,7 +22,7 @@ words = open(sys.argv[sys.argv.index("-in") + 1]).read()
 last = int(re.search(r"run (\\d+) upto", words)[1])
 share, says, code = {share!r}, {says!r}, {code!r}
 open("arguments.txt", "a").write(" ".join(sys.argv[1:]) + "\\n")
-with open("totals.txt", "a") as totals:
+with open("totals.txt", "a", buffering=1) as totals:
     for part in range(1, 11):
         if part <= 10 * share:
             print(f"{{last * part // 10}} 1 1 1 1 1 1", file=totals)

@@ -49,7 +49,7 @@ class Result:
 
     @property
     def state(self) -> str:
-        """ "at rest" where it comes to rest, "cold" where grains move and are hardly agitated, else how steady it is."""
+        """ "at rest" where it comes to rest, "cold" where grains move hardly agitated, else how steady it is."""
         if self.measured.notes.get("comes_to_rest") == "yes":
             return "at rest"
         temperature = self.measured.numbers.get("mean_temperature", math.inf)
