@@ -29,6 +29,8 @@ from chuteflow.dem.script import BIN, MOMENTS
 
 #: Width of the kernel, and the distance of the heights at which fields are given.
 KERNEL, SPACING = 0.25, 0.25
+#: An error that is a smaller share than this is rounding.
+_ROUNDING = 1e-12
 #: The kernel ends at so many of its widths.
 _CUT = 4.0
 #: Blocks that errors are told from.
@@ -432,5 +434,7 @@ def jackknife(sums: Sums, values: Callable[[Sums], Mapping[str, Any]]) -> tuple[
     errors = {}
     for name in whole:
         parts = np.array([one[name] for one in without])
-        errors[name] = np.sqrt((count - 1) / count * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+        error = np.sqrt((count - 1) / count * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+        # What is the same in all blocks, as the hold-up, has no error but rounding.
+        errors[name] = np.where(error < _ROUNDING * np.abs(whole[name]), 0.0, error)
     return {name: np.asarray(value) for name, value in whole.items()}, errors
