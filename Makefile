@@ -72,7 +72,7 @@ dem-test: $(VENV)/.compiled $(VENV)/.packages-test $(VENV)/.packages-dem ## test
 # What is done is left alone: interrupted or killed, the same command goes on.
 dem-study: $(VENV)/.compiled $(VENV)/.packages-dem ## simulate the study of theory against particles; hours
 	$(BIN)/chuteflow dem study --out dem-study --data docs/measured/particles
-	$(BIN)/chuteflow dem results docs/measured/particles --plot docs/images/particles.png
+	$(BIN)/chuteflow dem results docs/measured/particles --plot docs/images/particles.png > docs/measured/particles.txt
 
 wheel: dist/.built ## build the wheel into dist/
 
