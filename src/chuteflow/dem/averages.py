@@ -356,6 +356,7 @@ def numbers_of(sums: Sums, found: dict[str, Array], scene: Scene) -> dict[str, f
         "mass_holdup": M,
         "centre_of_mass": float(((np.arange(len(mass)) + 0.5) * BIN) @ mass) / M,
         "mean_temperature": mean_T,
+        "share_above": float(mass[-1]) / M,
         "slip_velocity": slip,
         "base_temperature": base_T,
         "base_volume_fraction": at_base("volume_fraction"),

@@ -47,6 +47,7 @@ NUMBERS = {
     "mass_holdup": ("M", "mass per unit area of the base"),
     "centre_of_mass": ("h", "height of the centre of mass above the bumps' centres"),
     "mean_temperature": ("T_mean", "granular temperature, mean over the grains"),
+    "share_above": ("", "share of the grains above the highest layer: no profile, height or temperature knows of them"),
     "slip_velocity": ("u_b", "velocity at the base: a line in p over p/M from 0.5 to 0.9, at p = M"),
     "base_temperature": ("T_b", "granular temperature at the base, by the same line"),
     "base_volume_fraction": ("nu_b", "volume fraction at the base, by the same line"),

@@ -19,7 +19,7 @@ from chuteflow.errors import InputError
 CLOSURES = ("lun", "garzo-dufty-fourier")
 #: A mean temperature below which a flow is cold, layers that slide over one another, and the drift over 300 time units
 #: up to which the functions of a flow that is not steady are shown.
-COLD, SLOW = 0.05, 0.1
+COLD, SLOW = 0.1, 0.1
 #: Heights that are kept of a run.
 HEIGHTS = 30
 #: Differences from the first law that the table shows.
@@ -59,7 +59,7 @@ class Result:
     def is_slow(self) -> bool:
         """Whether it moves, and changes slowly enough for averages over its time to be those of one state."""
         drifts = [abs(one.value) for one in self.measured.drifts.values()]
-        return self.state not in ("at rest", "cold") and max(drifts, default=0.0) < SLOW
+        return self.state != "at rest" and max(drifts, default=0.0) < SLOW
 
     def flux_ratios(self, closure: str, mapping: str) -> list[float]:
         """Q of the theory over that of the particles, of each flow at the same hold-up, from hot to cold."""

@@ -190,7 +190,7 @@ class Scene:
     @property
     def top(self) -> float:
         """Height up to which layers are averaged; the last one takes all grains above."""
-        return math.ceil(6.0 + 2.5 * self.holdup + 14.0 * max(self.temperature or 0.0, 1.0))
+        return math.ceil(6.0 + 2.5 * self.holdup + 25.0 * max(self.temperature or 0.0, 1.0))
 
     def as_dict(self) -> dict[str, Any]:
         """All arguments by name, as JSON has them."""

@@ -42,7 +42,7 @@ def plot_results(results: Sequence[Result]) -> Figure:
         ax.axhline(1.0, color=style.GREY, linewidth=0.6)
         ax.set_xlim(left=0.0)
         style.name_axes(ax, r"volume fraction, $\nu$", _RATIOS[name])
-        ax.set_ylim(*((0.9, 1.1) if name == "g1" else (0.5, 1.5)))
+        ax.set_ylim(0.5, 1.2 if name == "g1" else 1.5)
     for ax, (x, y) in zip(axes[3:5], _PAIRS.values(), strict=True):
         low, high = (f(f(ax.get_xlim()), f(ax.get_ylim())) for f in (min, max))
         ax.plot([low, high], [low, high], color=style.GREY, linewidth=0.6)

@@ -28,6 +28,8 @@ _EPILOG = (
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
 _SELDOM, _OFTEN = 20.0, 0.5
+#: Share of the grains above the highest layer that is told.
+_ABOVE = 0.005
 _TOLD = ("mass_flux", "mass_holdup", "centre_of_mass", "mean_temperature", "slip_velocity", "heat_from_base")
 
 
@@ -299,6 +301,12 @@ def _warnings(run: Run, measured: Measured) -> Iterator[str]:
         yield (
             f"a grain has {share:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
             "contact times: grains rest on one another, or contacts are too soft"
+        )
+    above = measured.numbers["share_above"]
+    if above > _ABOVE:
+        yield (
+            f"{100.0 * above:.2g} % of the grains are above the highest layer, {scene.top:g}: begin with a --temperature "
+            "nearer to that of the flow"
         )
     largest = measured.notes["largest_overlap"]
     if scene.stiffness is None and largest > 2.0 * bounds.overlap:
