@@ -72,6 +72,8 @@ def read_layers(path: Path) -> Layers:
     if not blocks:
         raise InputError(f"{path}: it holds no block yet; the run has to go on for longer")
     steps = sorted(blocks)
+    if len({len(block) for block in blocks.values()}) > 1:
+        raise InputError(f"{path}: its blocks have different numbers of layers: they are of different runs")
     whole = np.array([blocks[step] for step in steps])
     return Layers(np.array(steps), whole[:, :, 2], whole[:, :, 3:])
 

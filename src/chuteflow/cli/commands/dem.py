@@ -305,8 +305,8 @@ def _warnings(run: Run, measured: Measured) -> Iterator[str]:
     above = measured.numbers["share_above"]
     if above > _ABOVE:
         yield (
-            f"{100.0 * above:.2g} % of the grains are above the highest layer, {scene.top:g}: begin with a --temperature "
-            "nearer to that of the flow"
+            f"{100.0 * above:.2g} % of the grains are above the highest layer, {scene.top:g}: begin with a "
+            "--temperature nearer to that of the flow"
         )
     largest = measured.notes["largest_overlap"]
     if scene.stiffness is None and largest > 2.0 * bounds.overlap:
