@@ -58,6 +58,11 @@ def test_contacts_with_bumps_and_plane_are_losses_of_the_base(small):
     assert plane.force[0, 2] == pytest.approx(small.contacts.stiffness * 0.01 + small.contacts.damping(0.95, MASS) * 2)
 
 
+def test_a_grain_on_the_edge_of_the_box_is_in_it(small):
+    found = pair_contacts(small, frame([[-1e-18, 1, 2.0], [small.size[0], 1, 2.98]], [[0, 0, 0]] * 2))
+    assert found.overlap == pytest.approx([0.02])
+
+
 def test_two_bumps_that_touch_are_no_contact(small):
     assert pair_contacts(small, frame([[1, 1, 0], [1.99, 1, 0]], [[0, 0, 0]] * 2, bumps=(0, 1))).low.size == 0
 

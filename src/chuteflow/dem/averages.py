@@ -168,6 +168,8 @@ def pair_contacts(scene: Scene, frame: Frame) -> Contact:
     size = np.array([*scene.size, 0.0])
     place = frame.position.copy()
     place[:, :2] = np.mod(place[:, :2], size[:2])
+    # The remainder of a tiny negative number is rounded to the whole length.
+    place[:, :2][place[:, :2] >= size[:2]] = 0.0
     widest = max(1.0, 0.5 * (1.0 + scene.bump_diameter))
     pairs = cKDTree(place, boxsize=size).query_pairs(widest, output_type="ndarray")
     pairs = pairs[~(frame.is_bump[pairs].all(axis=1))]
