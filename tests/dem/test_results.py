@@ -1,6 +1,7 @@
 """Many measured flows together: the table, the picture, and the data of the study that the pages show."""
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,25 @@ def test_the_study_resumes_what_is_there(tmp_path):
     first = study.prepared(case, tmp_path)
     assert study.prepared(case, tmp_path) == first
     assert first.scene.temperature != case.scene.temperature
+
+
+def test_the_command_leaves_what_is_done_alone(folder, tmp_path, monkeypatch, capsys):
+    from chuteflow.dem.engine import VARIABLE
+
+    case = next(study.cases())
+    monkeypatch.setattr(study, "cases", lambda: iter([case]))
+    monkeypatch.setenv(VARIABLE, sys.executable)
+    done = tmp_path / "data" / f"{case.name}.csv"
+    done.parent.mkdir()
+    done.write_bytes((folder / "one.csv").read_bytes())
+    words = ["dem", "study", "--out", str(tmp_path / "study"), "--data", str(done.parent)]
+    assert main(words) == 0
+    assert "1 runs are in" in capsys.readouterr().out
+    assert not (tmp_path / "study").exists()
+    done.unlink()
+    # It is simulated now, by what is no LAMMPS.
+    assert main(words) == 1
+    assert f"run 1 of 1: {case.name}" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the data of the study are part of the repository, not of the package")

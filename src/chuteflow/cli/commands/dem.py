@@ -128,7 +128,7 @@ def read_command(source: str, **given: Any) -> None:
 @options.option("--data", metavar="FOLDER", help="Folder of the averages, one CSV for each run; OUT/data by default.")
 @options.option("--processes", type=click.INT, help="MPI processes of LAMMPS; 1 by default.")
 def study_command(**given: Any) -> None:
-    """Do the runs of the study of theory against particles that are not done; it takes hours."""
+    """Do the runs of the study of theory against particles whose averages are not in --data; it takes hours."""
     from chuteflow.dem import records
     from chuteflow.dem.engine import engine, require_processes
     from chuteflow.dem.measured import measure
@@ -142,14 +142,13 @@ def study_command(**given: Any) -> None:
     engine(processes)
     data = given["data"] or os.path.join(given["out"], "data")
     every = list(cases())
+    os.makedirs(data, exist_ok=True)
     for number, case in enumerate(every, 1):
-        run = prepared(case, given["out"])
-        if not run.is_complete:
-            click.echo(f"run {number} of {len(every)}: {case.name}", err=True)
-            _carry_out(run, processes)
         file = os.path.join(data, f"{case.name}.csv")
         if not os.path.exists(file):
-            os.makedirs(data, exist_ok=True)
+            click.echo(f"run {number} of {len(every)}: {case.name}", err=True)
+            run = prepared(case, given["out"])
+            _carry_out(run, processes)
             records.save(thinned(measure(run)), file)
     click.echo(f"{len(every)} runs are in {data}")
 
