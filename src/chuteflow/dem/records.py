@@ -12,7 +12,6 @@ import csv
 import math
 import os
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from chuteflow.dem.measured import FIELDS, NUMBERS, Measured
 from chuteflow.dem.output import Array
 from chuteflow.dem.steadiness import Drift
 from chuteflow.errors import InputError
+from chuteflow.io.dataset import Dataset, Variable
 from chuteflow.io.references import PAPER, numbers_are
 from chuteflow.io.writing import require_writable, write_whole
 
@@ -84,56 +84,52 @@ def _netcdf(measured: Measured) -> bytes:
     from chuteflow.io import netcdf_file
 
     stream = BytesIO()
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     with netcdf_file.create(stream) as file:
-        file.dimensions = {"height": len(measured.height), "tenth": 9}
-        file.attrs.update(
-            {
-                "Conventions": "CF-1.11",
-                "title": "a flow of grains down a chute, measured in a simulation of single grains",
-                "source": f"chuteflow {__version__}",
-                "history": f"{now} written by chuteflow {__version__}",
-                "references": PAPER,
-                "comment": f"{numbers_are(None)}; standard errors are those of the jackknife over blocks of time",
-                "steadiness": measured.steadiness,
-                **{name: getattr(measured, attribute) for name, attribute in _CHUTE.items()},
-                **measured.notes,
-            }
-        )
-        told = {"units": "1", "long_name": "height above the plane of the bumps' centres", "positive": "up"}
-        netcdf_file.write_variable(file, "height", ("height",), measured.height, told)
-        shares = np.arange(1, 10) / 10.0 + 0.05
-        told = {"units": "1", "long_name": "share of the hold-up above, middle of a tenth"}
-        netcdf_file.write_variable(file, "tenth", ("tenth",), shares, told)
-        for kind, values, errors in (
-            ("height", measured.fields, measured.errors),
-            ("tenth", measured.tenths, measured.tenth_errors),
-        ):
-            for name, array in values.items():
-                own = name if kind == "height" else f"mean_{name}"
-                _described(file, own, (kind,), array, errors.get(name), FIELDS[name])
-        for name, value in measured.numbers.items():
-            error = measured.number_errors.get(name)
-            _described(file, name, (), np.array(value), None if error is None else np.array(error), NUMBERS[name])
-        for name, one in measured.drifts.items():
-            about = ("", f"change of {name} over 300 time units, as a share of its mean")
-            _described(file, f"{_DRIFT}{name}", (), np.array(one.value), np.array(one.error), about)
+        _dataset(measured, netcdf_file.history()).write(file)
     return stream.getvalue()
 
 
-def _described(
-    file: Any, name: str, dimensions: tuple[str, ...], values: Array, errors: Array | None, about: tuple[str, str]
-) -> None:
-    from chuteflow.io.netcdf_file import write_variable
+def _dataset(measured: Measured, history: str) -> Dataset:
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": "a flow of grains down a chute, measured in a simulation of single grains",
+        "source": f"chuteflow {__version__}",
+        "history": history,
+        "references": PAPER,
+        "comment": f"{numbers_are(None)}; standard errors are those of the jackknife over blocks of time",
+        "steadiness": measured.steadiness,
+        **{name: getattr(measured, attribute) for name, attribute in _CHUTE.items()},
+        **measured.notes,
+    }
+    told = {"units": "1", "long_name": "height above the plane of the bumps' centres", "positive": "up"}
+    variables = {"height": Variable(("height",), measured.height, told)}
+    told = {"units": "1", "long_name": "share of the hold-up above, middle of a tenth"}
+    variables["tenth"] = Variable(("tenth",), np.arange(1, 10) / 10.0 + 0.05, told)
+    for name, values in measured.fields.items():
+        variables |= _described(name, ("height",), values, measured.errors.get(name), FIELDS[name])
+    for name, values in measured.tenths.items():
+        variables |= _described(f"mean_{name}", ("tenth",), values, measured.tenth_errors.get(name), FIELDS[name])
+    for name, value in measured.numbers.items():
+        variables |= _described(name, (), value, measured.number_errors.get(name), NUMBERS[name])
+    for name, one in measured.drifts.items():
+        about = ("", f"change of {name} over 300 time units, as a share of its mean")
+        variables |= _described(f"{_DRIFT}{name}", (), one.value, one.error, about)
+    return Dataset(variables, attributes)
 
+
+def _described(
+    name: str, dimensions: tuple[str, ...], values: Any, errors: Any, about: tuple[str, str]
+) -> dict[str, Variable]:
+    """A variable, and that of its standard errors where they are known."""
     symbol, long_name = about
     attributes = {"units": "1", "long_name": long_name} | ({"symbol": symbol} if symbol else {})
-    if errors is not None:
-        write_variable(
-            file, name + _ERROR, dimensions, errors, {"units": "1", "long_name": f"standard error of {name}"}
-        )
-        attributes["ancillary_variables"] = name + _ERROR
-    write_variable(file, name, dimensions, values, attributes)
+    if errors is None:
+        return {name: Variable(dimensions, np.asarray(values), attributes)}
+    own = {"units": "1", "long_name": f"standard error of {name}"}
+    return {
+        name: Variable(dimensions, np.asarray(values), attributes | {"ancillary_variables": name + _ERROR}),
+        name + _ERROR: Variable(dimensions, np.asarray(errors), own),
+    }
 
 
 def _from_netcdf(path: Path) -> Measured:

@@ -1,7 +1,7 @@
 """Maps of the domains of existence: classes over two parameters, and the boundaries between them.
 
 The outer axis gets as many columns as the boundaries ask for (:mod:`chuteflow.maps.columns`), which are
-worked out side by side in processes; the grid of the map is read off them.
+worked out in parallel processes; the grid of the map is read off them.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
 from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
@@ -43,7 +44,7 @@ LARGEST_SIZE = 5000
 
 
 @dataclass(frozen=True, eq=False)
-class Domain:
+class Domain(Result):
     """Classes over ``plane``, on a grid of cells and by their outlines.
 
     ``x`` (m,) and ``y`` (n,) are the centres of the cells. All else on the grid is (n, m), row by row from the

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.numerics.roots import secants
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
 from chuteflow.steady.kinds import density_kind, interior_kind
@@ -41,7 +43,7 @@ _SMALLEST_SHARE = 1e-260
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Result):
     """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS.
 
     The normal stress is the weight of the grains above (3.2), (3.4), and the shear stress tan(theta) times that
@@ -94,7 +96,7 @@ class EnergyBudget:
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class Flow(Result):
     """A steady, fully developed flow on ``chute``.
 
     All numbers are dimensionless (lengths in grain diameters d, velocities in sqrt(g d cos theta),
@@ -115,6 +117,13 @@ class Flow:
         rows.append(("error", display.number(self.error), "estimated relative error of Q, h and M, the largest"))
         kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
         return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
+
+    def _compared(self) -> tuple[object, ...]:
+        solution = self.solution
+        return self.chute, solution.macroscopic, solution.error, solution.status.name
+
+    def _mark(self) -> bytes:
+        return self.solution.macroscopic.tobytes()
 
     @property
     def name(self) -> str:
@@ -183,9 +192,14 @@ class Flow:
     @cached_property
     def depth(self) -> float:
         """Height above which nu is below 1 % of its maximum, or of the interface where it stays above."""
+        return float(self._heights(np.array([self._share_above_depth]))[0])
+
+    @cached_property
+    def _share_above_depth(self) -> float:
+        """Share of the mass hold-up above the depth: 0 where that is the height of the interface."""
         target = np.log(CUTOFF * self.largest_volume_fraction)
         if self._model.surface_stress and self._log_density(0.0) >= target:
-            return self.interface_height
+            return 0.0
         low, high = np.log(_SMALLEST_SHARE), np.log(self._share_of_largest[0])
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -193,7 +207,32 @@ class Flow:
                 low = middle
             else:
                 high = middle
-        return float(self._heights(np.array([np.exp(0.5 * (low + high))]))[0])
+        return float(np.exp(0.5 * (low + high)))
+
+    @property
+    def mean_velocity(self) -> float:
+        """Q/M, the velocity of the grains averaged over their mass."""
+        return self.mass_flux / self.mass_holdup
+
+    @property
+    def surface_velocity(self) -> float:
+        """u far above (half-line) or at the interface."""
+        return float(self._antiderivatives[1][0])
+
+    @property
+    def mean_volume_fraction(self) -> float:
+        """nu averaged over heights from the base to the depth."""
+        return self.mass_holdup * (1.0 - self._share_above_depth) / self.depth
+
+    @property
+    def froude_number(self) -> float:
+        """Mean velocity over sqrt(g cos(theta) depth)."""
+        return self.mean_velocity / math.sqrt(self.depth)
+
+    @property
+    def angle(self) -> float:
+        """Inclination of the chute in degrees."""
+        return self.chute.angle
 
     @cached_property
     def interior(self) -> str:

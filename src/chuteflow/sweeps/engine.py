@@ -20,7 +20,7 @@ from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
-from chuteflow.sweeps.numbers import KINDS, numbers
+from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
 from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
@@ -73,31 +73,31 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     valid = _valid(study, out.parameters, failures)
     out.status[~valid] = Status.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
-    # Lanes side by side have the base of the paper.
+    # Members of a batch have the base of the paper.
     other = _on_other_bases(study, out.parameters) & valid
     singly, winding = int(other.sum()), 0
     for point in np.flatnonzero(other).tolist():
         _fill_singly(study, out, point, failures)
     out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
     valid &= ~other
-    for closure, surface, members in _groups(study, out.parameters, valid):
-        batch = _batch(closure, surface, out.parameters, members)
-        value = out.parameters[study.condition][members]
+    for closure, surface, points in _groups(study, out.parameters, valid):
+        batch = _batch(closure, surface, out.parameters, points)
+        value = out.parameters[study.condition][points]
         winds = _may_lose_flows(study, batch, value)
         others = np.flatnonzero(~winds)
         solved = _solved(study, batch.take(others), value[others])
-        _fill(study, out, members[others], solved)
-        for point in [*members[winds].tolist(), *members[others[solved.unsettled]].tolist()]:
+        _fill(study, out, points[others], solved)
+        for point in [*points[winds].tolist(), *points[others[solved.unsettled]].tolist()]:
             _fill_singly(study, out, point, failures)
         winding += int(winds.sum())
         singly += int(solved.unsettled.sum())
-        _fill_reasons(out, batch, members)
+        _fill_reasons(out, batch, points)
     told = {first + i: why for i, why in sorted(failures.items())}
     return replace(out, failures=told, singly=singly, winding=winding)
 
 
 def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
-    """The lanes on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
+    """The members on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
 
     Given surface temperatures are followed down one by one, so that no family of flows has to be found; a given hold-up
     need not be followed further.
@@ -175,20 +175,20 @@ def _groups(
     """Closure, surface and points of the groups that share both."""
     for i, closure in enumerate(study.laws):
         for j, surface in enumerate(SURFACES):
-            members = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
-            if members.size:
-                yield closure, surface, members
+            points = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
+            if points.size:
+                yield closure, surface, points
 
 
-def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
-    roughness = np.minimum(parameters["roughness"][members], BY_KEY["roughness"].high)
-    slope, e, ew = (np.ascontiguousarray(parameters[name][members]) for name in ("slope", "e", "ew"))
+def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], points: Indices) -> Batch:
+    roughness = np.minimum(parameters["roughness"][points], BY_KEY["roughness"].high)
+    slope, e, ew = (np.ascontiguousarray(parameters[name][points]) for name in ("slope", "e", "ew"))
     return Batch.of(closure, surface, slope, e, ew, roughness)
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Every flow of a batch (k,), its quantities by name (k,), and the lanes (n,) to be solved one by one."""
+    """Every flow of a batch (k,), its quantities by name (k,), and the members (n,) to be solved one by one."""
 
     flows: Flows
     quantities: Mapping[str, Array]
@@ -197,8 +197,10 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    are judged, or the law has breaks, at which integration side by side would lose its order."""
-    if not len(batch) or wanted(study.quantities) or not batch.law.smooth:
+    are judged or asked for what is not carried along, or the law has breaks, at which integration in a batch would
+    lose its order."""
+    singly = wanted(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
+    if not len(batch) or singly or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
@@ -217,40 +219,40 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     except _FAILURES:
         if len(batch) == 1:
             return _Solved(Flows.joined([]), dict.fromkeys(study.quantities, np.empty(0)), np.ones(1, dtype=bool))
-    # One lane must not keep the others from being solved: it is found by halves.
+    # One member must not keep the others from being solved: it is found by halves.
     half = len(batch) // 2
-    lanes = np.arange(len(batch))
-    one, two = (_solved(study, batch.take(some), value[some]) for some in (lanes[:half], lanes[half:]))
+    members = np.arange(len(batch))
+    one, two = (_solved(study, batch.take(some), value[some]) for some in (members[:half], members[half:]))
     return _Solved(
-        Flows.joined([one.flows, replace(two.flows, lane=two.flows.lane + half)]),
+        Flows.joined([one.flows, replace(two.flows, member=two.flows.member + half)]),
         {name: np.concatenate([one.quantities[name], two.quantities[name]]) for name in study.quantities},
         np.concatenate([one.unsettled, two.unsettled]),
     )
 
 
 def _sound(solved: _Solved) -> _Solved:
-    """Without the lanes on which a quantity is not a number: they are solved one by one."""
-    good = np.ones(solved.flows.lane.size, dtype=bool)
+    """Without the members on which a quantity is not a number: they are solved one by one."""
+    good = np.ones(solved.flows.member.size, dtype=bool)
     for values in solved.quantities.values():
         good &= ~np.isnan(values)
     if good.all():
         return solved
     unsettled = solved.unsettled.copy()
-    unsettled[solved.flows.lane[~good]] = True
-    kept = ~unsettled[solved.flows.lane]
+    unsettled[solved.flows.member[~good]] = True
+    kept = ~unsettled[solved.flows.member]
     values = {name: value[kept] for name, value in solved.quantities.items()}
     return _Solved(solved.flows.take(kept), values, unsettled)
 
 
-def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
-    """Put flows, in order of lanes and along each from hot to cold, into the rows of their points."""
+def _fill(study: Study, out: Chunk, points: Indices, solved: _Solved) -> None:
+    """Put flows, in order of members and along each from hot to cold, into the rows of their points."""
     flows = solved.flows
-    counts = np.bincount(flows.lane, minlength=len(members))
-    out.n_flows[members] = counts
-    out.status[members[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
-    place = np.arange(flows.lane.size) - (np.cumsum(counts) - counts)[flows.lane]
+    counts = np.bincount(flows.member, minlength=len(points))
+    out.n_flows[points] = counts
+    out.status[points[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
+    place = np.arange(flows.member.size) - (np.cumsum(counts) - counts)[flows.member]
     kept = place < study.flows
-    where = members[flows.lane[kept]], place[kept]
+    where = points[flows.member[kept]], place[kept]
     out.error[where] = flows.error[kept]
     for name, values in solved.quantities.items():
         out.quantities[name][where] = values[kept]
@@ -300,7 +302,7 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
             values[point, k] = KINDS[name].index(value) if name in KINDS else value
 
 
-def _fill_reasons(out: Chunk, batch: Batch, members: Indices) -> None:
-    none = np.flatnonzero((out.n_flows[members] == 0) & (out.status[members] == Status.COMPLETE))
+def _fill_reasons(out: Chunk, batch: Batch, points: Indices) -> None:
+    none = np.flatnonzero((out.n_flows[points] == 0) & (out.status[points] == Status.COMPLETE))
     if none.size:
-        out.reason[members[none]] = reasons(batch.take(none))
+        out.reason[points[none]] = reasons(batch.take(none))

@@ -8,6 +8,7 @@ COMMANDS = {
     "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
     "sweep": "The flows of very many chutes, as a study says, into a Zarr store.",
+    "cases": "The chutes and materials that --case takes, with the source of each number.",
     "closures": "The constitutive laws that there are, their parameters, and the functions of one of them.",
     "compare-closures": "The flows of one chute under several constitutive laws, side by side.",
     "figures": "Draw figures of the paper.",
