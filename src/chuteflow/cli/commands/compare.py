@@ -53,9 +53,7 @@ _SAVED = (".json", ".csv")
 @options.option(
     "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not say it."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write the differences to FILE: .json or .csv.")
+@options.output_options(_SAVED, "profiles and functions")
 def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
     """Read, compare, tell and draw."""
     from functools import partial

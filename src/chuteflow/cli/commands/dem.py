@@ -80,6 +80,7 @@ def command() -> None:
 @options.option(
     "--out", metavar="FOLDER", help="Folder of the run, made or gone on with; averages go to FOLDER/run.nc."
 )
+@options.quiet_option
 @click.option("--write-only", is_flag=True, help="Write the input of LAMMPS into the folder, to run it elsewhere.")
 def run_command(**given: Any) -> None:
     """Simulate a chute; what was interrupted or killed goes on with the same command."""
@@ -127,6 +128,7 @@ def read_command(source: str, **given: Any) -> None:
 @options.option("--out", metavar="FOLDER", help="Folder of the study, made or gone on with.")
 @options.option("--data", metavar="FOLDER", help="Folder of the averages, one CSV for each run; OUT/data by default.")
 @options.option("--processes", type=click.INT, help="MPI processes of LAMMPS; 1 by default.")
+@options.quiet_option
 def study_command(**given: Any) -> None:
     """Do the runs of the study of theory against particles whose averages are not in --data; it takes hours."""
     from chuteflow.dem import records
@@ -146,7 +148,7 @@ def study_command(**given: Any) -> None:
     for number, case in enumerate(every, 1):
         file = os.path.join(data, f"{case.name}.csv")
         if not os.path.exists(file):
-            click.echo(f"run {number} of {len(every)}: {case.name}", err=True)
+            options.note(f"run {number} of {len(every)}: {case.name}")
             run = prepared(case, given["out"])
             _carry_out(run, processes)
             records.save(thinned(measure(run)), file)
@@ -243,7 +245,7 @@ class _Watch:
         if self._line.is_shown:
             self._line.tell(text)
         else:
-            click.echo(text, err=True)
+            options.note(text)
 
     def end(self) -> None:
         """Take the line away."""
