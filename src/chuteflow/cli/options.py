@@ -308,13 +308,14 @@ def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[
     endings = f"{', '.join(saved[:-1])} or {saved[-1]}" if saved else ""
     return _options(
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
-        _plot_option(plotted),
+        plot_options(plotted),
         *([option("--save", metavar="FILE", help=f"Write everything to FILE: {endings}.")] if saved else []),
         quiet_option,
     )
 
 
-def _plot_option(what: str) -> Callable[[Command], Command]:
+def plot_options(what: str) -> Callable[[Command], Command]:
+    """Options of a picture; ``what`` says what is drawn."""
     return _options(
         option(
             "--plot",

@@ -158,7 +158,8 @@ def study_command(**given: Any) -> None:
 @command.command("results")
 @click.argument("folder", metavar="FOLDER")
 @click.option("--with", "closures", metavar="NAME", multiple=True, help="Closures to compare with, the first in full.")
-@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
+@options.plot_options("functions, base and fluxes")
+@options.quiet_option
 def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> None:
     """Compare all measured flows in the files of FOLDER with the theory at the same hold-up."""
     options.require_outputs({"save": None, **given})
