@@ -30,7 +30,7 @@ METADATA := pyproject.toml $(wildcard README.md LICENSE)
 # Looked up by the shell, not by $(wildcard), which would remember the folder as it was before the build.
 WHEEL = $$(echo dist/chuteflow-*.whl)
 
-.PHONY: help demo test test-all lint types unit docs man bench wheel dist clean
+.PHONY: help demo test test-all lint types unit docs man bench dem-test dem-study wheel dist clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
@@ -68,6 +68,14 @@ man: $(VENV)/.compiled $(VENV)/.packages-test ## build the manual page build/man
 
 bench: $(VENV)/.compiled $(VENV)/.packages-bench ## time the solver, beside what one would pick instead
 	$(BIN)/python benchmarks/run.py
+
+dem-test: $(VENV)/.compiled $(VENV)/.packages-test $(VENV)/.packages-dem ## test simulations of grains with LAMMPS
+	$(BIN)/pytest -m "" tests/dem
+
+# What is done is left alone: interrupted or killed, the same command goes on.
+dem-study: $(VENV)/.compiled $(VENV)/.packages-dem ## simulate the study of theory against particles; hours
+	$(BIN)/chuteflow dem study --out dem-study --data docs/measured/particles
+	$(BIN)/chuteflow dem results docs/measured/particles --plot docs/images/particles.png > docs/measured/particles.txt
 
 wheel: dist/.built ## build the wheel into dist/
 
@@ -112,6 +120,11 @@ $(VENV)/.compiled: $(VENV)/.package $(VENV)/.packages-run
 $(VENV)/.packages-test: pyproject.toml constraints.txt | $(VENV)/.packages-run
 	@echo "== installing the packages that test it"
 	@$(INSTALL) "$(WHEEL)[test]"
+	@touch $@
+
+$(VENV)/.packages-dem: pyproject.toml constraints.txt | $(VENV)/.packages-run
+	@echo "== installing the packages that simulate grains"
+	@$(INSTALL) "$(WHEEL)[dem]"
 	@touch $@
 
 $(VENV)/.packages-bench: pyproject.toml constraints.txt | $(VENV)/.packages-run

@@ -30,6 +30,7 @@ LAYERS = (
     "stability",
     "sweeps",
     "io",
+    "dem",
     "plotting",
     "paper",
     "explorer",

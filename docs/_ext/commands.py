@@ -24,11 +24,13 @@ class Commands(FromPackage):
         return [self._section(name, context) for name in program.list_commands(context)]
 
     def _section(self, name: str, parent: click.Context) -> nodes.section:
-        command = program.get_command(parent, name)
+        group = parent.command
+        assert isinstance(group, click.Group)
+        command = group.get_command(parent, name)
         assert command is not None
         context = click.Context(command, info_name=name, parent=parent)
-        title = f"chuteflow {name}"
-        section = nodes.section(ids=[f"chuteflow-{name}"], names=[title])
+        title = context.command_path
+        section = nodes.section(ids=[title.replace(" ", "-")], names=[title])
         section += nodes.title(title, title)
         section += _prose(command.help or "")
         usage = command.get_usage(context).removeprefix("Usage: ")
@@ -36,6 +38,8 @@ class Commands(FromPackage):
         section += self._options(command, context)
         for paragraph in (command.epilog or "").split("\n\n"):
             section += _example(paragraph) if paragraph.startswith("Example: ") else _prose(paragraph)
+        if isinstance(command, click.Group):
+            section += [self._section(part, context) for part in command.list_commands(context)]
         return section
 
     def _options(self, command: click.Command, context: click.Context) -> nodes.definition_list:

@@ -259,6 +259,9 @@ WITHOUT = {
     "figures": ("chute", "case", "si", "json", "save", "plot"),
     "claims": ("chute", "case", "si", "save", "plot"),
     "report": ("chute", "case", "si", "json", "save", "plot"),
+    # A group: its parts have options.
+    "dem": ("chute", "case", "si", "json", "save", "plot", "quiet"),
+    "compare": ("chute", "case", "si"),
     "explore": ("chute", "case", "si", "json", "save", "plot", "quiet"),
 }
 

@@ -308,13 +308,14 @@ def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[
     endings = f"{', '.join(saved[:-1])} or {saved[-1]}" if saved else ""
     return _options(
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
-        _plot_option(plotted),
+        plot_options(plotted),
         *([option("--save", metavar="FILE", help=f"Write everything to FILE: {endings}.")] if saved else []),
         quiet_option,
     )
 
 
-def _plot_option(what: str) -> Callable[[Command], Command]:
+def plot_options(what: str) -> Callable[[Command], Command]:
+    """Options of a picture; ``what`` says what is drawn."""
     return _options(
         option(
             "--plot",
@@ -403,6 +404,21 @@ def words(given: Mapping[str, Any]) -> dict[str, str]:
 
         found["closure"] = settings_added(found.get("closure", "lun"), given["settings"])
     return found
+
+
+def closure_names(given: Sequence[str]) -> list[str]:
+    """The closures of several --with, each once; all that there are where none is given.
+
+    Raises:
+        InputError: for a closure of another package that cannot be loaded.
+    """
+    from chuteflow.theory.laws import known_laws
+
+    if not given:
+        return list(known_laws())
+    # A comma also parts the parameters of one.
+    names = [name for text in given for name in (text.split(",") if "=" not in text else [text])]
+    return list(dict.fromkeys(name.strip() for name in names))
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:

@@ -18,5 +18,7 @@ COMMANDS = {
     "stability": "Which flows are stable, and the disturbance that grows fastest.",
     "growth": "Growth rates of a flow over wavenumbers along and across the slope, and its neutral curves.",
     "neutral": "Growth of waves in one direction along a family of flows, and the neutral curves.",
+    "dem": "Simulate the grains of a chute one by one with LAMMPS, and measure the flow.",
+    "compare": "Compare a simulated or measured flow with the flows and laws of the theory.",
     "relax": "Follow a disturbed flow in time, to the steady flow that it comes to.",
 }

@@ -50,7 +50,7 @@ def command(**given: Any) -> None:
     from chuteflow.branches.enumeration import flows
 
     # Every chute is checked before anything is computed.
-    chutes = [replace(chute, closure=name) for name in _names(given["closures"])]
+    chutes = [replace(chute, closure=name) for name in options.closure_names(given["closures"])]
     search = options.search(given, chute.slope, scales)
     found = [flows(one, **condition, **search) for one in chutes]
 
@@ -83,17 +83,6 @@ def _rows(content: dict[str, Any]) -> Iterator[list[str]]:
         for flow in one["flows"]:
             cells = (flow[symbol] for symbol in (*symbols, "error"))
             yield [f'"{name}"', *("" if cell is None else repr(cell) for cell in cells)]
-
-
-def _names(given: Sequence[str]) -> list[str]:
-    """The closures asked for, each once."""
-    from chuteflow.theory.laws import known_laws
-
-    if not given:
-        return list(known_laws())
-    # A comma also parts the parameters of one.
-    names = [name for text in given for name in (text.split(",") if "=" not in text else [text])]
-    return list(dict.fromkeys(name.strip() for name in names))
 
 
 def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:

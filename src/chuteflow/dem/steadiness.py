@@ -1,0 +1,56 @@
+"""Whether a run is steady: drifts over its measured time, each with an error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from chuteflow.dem.output import Array
+
+#: Drifts are given over this time, and steady is below this share of the mean.
+SPAN, LIMIT = 300.0, 0.01
+#: Windows that a drift is told from.
+WINDOWS = 10
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The change of a number over 300 time units, as a share of its mean, with its standard error."""
+
+    value: float
+    error: float
+
+    @property
+    def verdict(self) -> str:
+        """ "steady", "not steady" or "undecided": a limit of 1 % against the drift within two errors."""
+        if not math.isfinite(self.value + self.error):
+            return "undecided"
+        if abs(self.value) + 2.0 * self.error < LIMIT:
+            return "steady"
+        return "not steady" if abs(self.value) - 2.0 * self.error > LIMIT else "undecided"
+
+
+def drift(times: Array, values: Array) -> Drift:
+    """The drift of ``values`` (n,) at ``times`` (n,): a straight line through means over ten windows; its error is
+    that of their scatter about the line."""
+    count = min(WINDOWS, len(values))
+    if count < 4:
+        return Drift(math.nan, math.nan)
+    t = np.array([part.mean() for part in np.array_split(times, count)])
+    y = np.array([part.mean() for part in np.array_split(values, count)])
+    away = t - t.mean()
+    slope = float(away @ y / (away @ away))
+    left = y - y.mean() - slope * away
+    error = math.sqrt(float(left @ left) / (count - 2) / float(away @ away))
+    scale = SPAN / abs(float(y.mean())) if y.mean() else math.nan
+    return Drift(slope * scale, error * scale)
+
+
+def verdict(drifts: dict[str, Drift]) -> str:
+    """Of several drifts: "not steady" if one is, "steady" if all are, else "undecided"."""
+    found = {one.verdict for one in drifts.values()}
+    if "not steady" in found:
+        return "not steady"
+    return "steady" if found == {"steady"} else "undecided"

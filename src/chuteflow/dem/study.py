@@ -1,0 +1,96 @@
+"""The study of theory against particles: its runs, one after the other, each in a folder that is resumed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from chuteflow.dem.contacts import Bounds
+from chuteflow.dem.run import RECORD, Run, prepare, read_record
+from chuteflow.dem.scene import Scene
+from chuteflow.dem.script import Schedule
+from chuteflow.dem.start import like_theory
+from chuteflow.steady.chute import Chute
+
+#: e, slope, M and r of the hot flows; the base has the restitution of the grains.
+HOT = (
+    (0.95, 0.18, 1.264, 0.6),
+    (0.95, 0.15, 0.6, 0.6),
+    (0.9, 0.25, 1.3, 0.6),
+    (0.98, 0.12, 1.3, 0.7),
+    (0.93, 0.2, 1.3, 0.6),
+    (0.95, 0.18, 1.3, 0.7),
+    (0.9, 0.22, 0.6, 0.6),
+    (0.9, 0.25, 1.3, 0.7),
+    (0.98, 0.1, 0.6, 0.6),
+    (0.95, 0.2, 1.3, 0.7),
+    (0.95, 0.18, 3.0, 0.6),
+    (0.93, 0.22, 3.0, 0.6),
+    (0.98, 0.12, 3.0, 0.7),
+    (0.9, 0.25, 3.0, 0.6),
+)
+#: Hot flows that are simulated on random bases too.
+RANDOM = (0, 1, 2, 5)
+SEEDS = (1, 2, 3)
+#: The paper's chute, and the hold-ups of its flows A, B and C at Q = 3.
+PAPER, PAPER_HOLDUPS = Chute(0.3, 0.8, 0.8, 0.6), {"A": 0.44, "B": 0.59, "C": 1.26}
+#: Errors of the restitution in one collision; they cancel over many.
+_BOUNDS = Bounds(restitution=3e-3)
+_SCHEDULE = Schedule(settle=300.0, measure=900.0)
+_BOX, _SMALLER_BOX = (12.0, 12.0), (9.0, 9.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run of the study: its name, which is that of its folder, its scene and its schedule."""
+
+    name: str
+    scene: Scene
+    schedule: Schedule = _SCHEDULE
+
+
+def cases() -> Iterator[Case]:
+    """All runs, in the order in which they are done: every chute once before any seed is changed."""
+    yield from (_hot(number, 1) for number in range(10))
+    yield from (_hot(0, seed) for seed in SEEDS[1:])
+    yield from _variations()
+    yield from _paper()
+    yield from (_hot(number, 1, base="random") for number in RANDOM)
+    yield from (_hot(number, 1) for number in range(10, len(HOT)))
+    yield from (_hot(number, seed) for seed in SEEDS[1:] for number in range(1, len(HOT)))
+    yield from (_hot(number, seed, base="random") for seed in SEEDS[1:] for number in RANDOM)
+
+
+def _hot(number: int, seed: int, base: str = "triangular") -> Case:
+    e, slope, holdup, roughness = HOT[number]
+    box = _BOX if holdup < 2.0 else _SMALLER_BOX
+    scene = Scene(Chute(slope, e, e, roughness), holdup, box=box, base=base, seed=seed, bounds=_BOUNDS)
+    return Case(f"hot{number + 1:02d}-{base}-{seed}", scene)
+
+
+def _paper() -> Iterator[Case]:
+    for start in ("hot", "cold"):
+        for name, holdup in PAPER_HOLDUPS.items():
+            scene = Scene(PAPER, holdup, box=_BOX, start=start, bounds=Bounds(restitution=6e-3))
+            yield Case(f"paper-{name}-{start}", scene)
+
+
+def _variations() -> Iterator[Case]:
+    """The first chute with contacts twice as stiff, half the time step, and a box of twice the length."""
+    first = _hot(0, 1)
+    scene = like_theory(first.scene)
+    yield Case("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness))
+    yield Case("finer", replace(scene, bounds=replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)))
+    yield Case("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1])))
+
+
+def prepared(case: Case, folder: str | os.PathLike[str]) -> Run:
+    """The run of a case in its folder below ``folder``; a hot start begins near the flow of the theory."""
+    path = Path(folder) / case.name
+    if (path / RECORD).exists():
+        scene = read_record(path).scene
+    else:
+        scene = like_theory(case.scene) if case.scene.start == "hot" else case.scene
+    return prepare(path, scene, case.schedule)
