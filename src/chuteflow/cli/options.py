@@ -220,7 +220,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
     for name in ("diameter", "density"):
         if name not in texts:
             raise InputError(f"SI units need --diameter and --density: --{name} is missing")
-    from chuteflow.cli.units import read_si
+    from chuteflow.io.units import read_si
     from chuteflow.steady.quantities import Scales
 
     return Scales(**{name: read_si(f"--{name}", text, _SCALES[name]) for name, text in texts.items()})
@@ -238,7 +238,7 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
     if len(named) > 1:
         both = " and ".join(f"{_written(name)} {given[name]}" for name in named)
         raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
-    from chuteflow.cli.units import read_amount
+    from chuteflow.io.units import read_amount
 
     chosen = _CONDITIONS[named[0]]
     amount = read_amount(_written(chosen.option), given[chosen.option], chosen.quantity, scales, chute.slope)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,9 @@ from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
+
+if TYPE_CHECKING:
+    from chuteflow.steady.sensitivity import Sensitivity
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
@@ -165,8 +169,7 @@ class Flow:
     @property
     def slip_velocity(self) -> float:
         """u at the base, (3.15)."""
-        state = self._state
-        return float(self._model.slip(state.f[:, -1]) * np.exp(0.5 * state.log_t[-1]))
+        return float(self._slip)
 
     @cached_property
     def largest_volume_fraction(self) -> float:
@@ -183,9 +186,14 @@ class Flow:
     @cached_property
     def depth(self) -> float:
         """Height above which nu is below 1 % of its maximum, or of the interface where it stays above."""
+        return float(self._heights(np.array([self._share_above_depth]))[0])
+
+    @cached_property
+    def _share_above_depth(self) -> float:
+        """Share of the mass hold-up above the depth: 0 where that is the height of the interface."""
         target = np.log(CUTOFF * self.largest_volume_fraction)
         if self._model.surface_stress and self._log_density(0.0) >= target:
-            return self.interface_height
+            return 0.0
         low, high = np.log(_SMALLEST_SHARE), np.log(self._share_of_largest[0])
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -193,7 +201,7 @@ class Flow:
                 low = middle
             else:
                 high = middle
-        return float(self._heights(np.array([np.exp(0.5 * (low + high))]))[0])
+        return float(np.exp(0.5 * (low + high)))
 
     @cached_property
     def interior(self) -> str:
@@ -289,6 +297,13 @@ class Flow:
         points = whole("points", points, 1, _MOST_POINTS)
         return self.profile(np.linspace(0.0, self.depth if top is None else number("top", top), points))
 
+    def sensitivity(self, parameters: Sequence[str] | None = None, *, at: str = "Q") -> Sensitivity:
+        """Exact derivatives of all quantities and profiles with respect to parameters of the chute, see
+        :func:`chuteflow.steady.sensitivity.sensitivity`."""
+        from chuteflow.steady.sensitivity import sensitivity
+
+        return sensitivity(self, parameters, at=at)
+
     @property
     def _model(self) -> Model:
         return self.solution.problem.model
@@ -300,6 +315,16 @@ class Flow:
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @property
+    def _slip(self) -> Array:
+        state = self._state
+        return self._model.slip(state.f[:, -1]) * np.exp(0.5 * state.log_t[-1])
+
+    @property
+    def _limit(self) -> Array:
+        """The surface temperature; where T has no limit far above, of T p^beta."""
+        return np.exp(self.solution.macroscopic[LOG_T])
+
     @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
@@ -308,14 +333,17 @@ class Flow:
         matrix = interpolation_matrix(problem.grid, s)
         g = matrix @ state.g
         theta = matrix @ state.theta
-        p = state.mass * share + self._model.surface_stress
+        return self._pointwise(state.mass * share + self._model.surface_stress, theta, g)
+
+    def _pointwise(self, p: Array, theta: Array, g: Array) -> tuple[dict[str, Array], Array]:
+        """What follows from the normal stress, the potential and its gradient, at any points."""
         x = self._model.density_argument(p, theta)
         f, _ = self._model.closures(x)
-        rise = p * g / state.mass - self._model.beta
+        rise = p * g / self._state.mass - self._model.beta
         fields = {
             "p": p,
             "nu": _density(x, f),
-            "y": f[CONDUCTION] * g / state.mass,
+            "y": f[CONDUCTION] * g / self._state.mass,
             "rise": rise,
             "log_t": self._model.log_temperature(p, theta, f[GAMMA]),
         }
@@ -364,7 +392,7 @@ class Flow:
             beta = self._model.beta
             power = state.p[1:] ** -(1.0 + beta)
             regular = np.zeros_like(span)
-            regular[1:] = (per_fall[1:] / state.p[1:] - self.surface_temperature * power) * span[1:]
+            regular[1:] = (per_fall[1:] / state.p[1:] - self._limit * power) * span[1:]
         elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
@@ -374,7 +402,7 @@ class Flow:
         glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
         height = g.integral @ regular
         velocity = g.integral @ glide
-        return height[-1] - height, self.slip_velocity + velocity[-1] - velocity
+        return height[-1] - height, self._slip + velocity[-1] - velocity
 
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
@@ -382,9 +410,9 @@ class Flow:
         if self._model.unlimited:
             beta, mass = self._model.beta, self._state.mass[0]
             powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
-            z = z + self.surface_temperature / beta * powers
+            z = z + self._limit / beta * powers
         elif self._model.surface_stress == 0.0:
-            z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
+            z = z - self._limit * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
     @_vanishing
@@ -408,10 +436,14 @@ class Flow:
 
     @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
-        at, f = self._at_share(share)
+        s = stretch_position(share, self.solution.problem.stretch)
+        velocity = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1]
+        return self._local(*self._at_share(share)) | {"velocity": velocity}
+
+    def _local(self, at: dict[str, Array], f: Array) -> dict[str, Array]:
+        """The fields that follow from what :meth:`_pointwise` gives."""
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
         root_t = np.exp(0.5 * at["log_t"])
-        s = stretch_position(share, self.solution.problem.stretch)
         conducting, beta = f[CONDUCTION] * root_t, self._model.beta
         if beta == 0.0:
             conductive = conducting * (rise + f[COUPLING] * (1.0 - rise))
@@ -422,7 +454,6 @@ class Flow:
         return {
             "volume_fraction": nu,
             "granular_temperature": root_t**2,
-            "velocity": interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1],
             "heat_flux": at["y"] * p * root_t,
             "conductive_heat_flux": conductive,
             "density_heat_flux": along_density,

@@ -1,0 +1,155 @@
+"""The numbers of a chute that can be varied one by one: its four parameters, and those of its law and its base.
+
+They are called by the keys of :data:`chuteflow.parameters.BY_KEY`, such as ``ew``, and by ``closure.NAME`` and
+``base.NAME``, such as ``closure.packing`` and ``base.specularity``. A plain NAME is enough where it is the only one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from chuteflow.checks import shown
+from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
+from chuteflow.steady.chute import Chute
+from chuteflow.theory.bases import base
+
+#: Where a parameter may lie, and between which values it is looked for, by the last part of its name.
+_RANGES = {
+    "closure.packing": ((0.5, 0.74048), (0.58, 0.68)),
+    "closure.friction": ((0.0, 2.0), (0.0, 0.4)),
+    "base.diameter": ((0.1, 10.0), (0.5, 2.0)),
+    "base.specularity": ((1e-6, 1.0), (0.02, 0.9)),
+    "base.packing": ((0.3, 1.0), (0.5, 0.74)),
+}
+_LIKELY = {"slope": (0.1, 0.7), "e": (0.6, 0.98), "ew": (0.3, 0.98), "roughness": (0.5, math.sqrt(3.0) / 2.0)}
+_LATEX = {
+    "closure.packing": r"\nu^*",
+    "closure.friction": r"\mu",
+    "base.diameter": r"d_w/d",
+    "base.specularity": r"\phi",
+    "base.packing": r"\nu^*_w",
+}
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """A number of a chute that can be varied.
+
+    ``key`` is what it is called; it lies from ``low`` to ``high``, and is looked for in ``likely`` unless another range
+    is given.
+    """
+
+    key: str
+    low: float
+    high: float
+    likely: tuple[float, float]
+
+    @property
+    def model_name(self) -> str:
+        """What :func:`chuteflow.steady.model.stepped_model` calls it."""
+        return BY_KEY[self.key].name if self.key in BY_KEY else self.key
+
+    @property
+    def latex(self) -> str:
+        """Its symbol."""
+        return BY_KEY[self.key].latex if self.key in BY_KEY else _LATEX.get(self.key, rf"\mathrm{{{self.key}}}")
+
+    @property
+    def of_base(self) -> bool:
+        """Whether it belongs to the base alone."""
+        return BY_KEY[self.key].of_base if self.key in BY_KEY else self.key.startswith("base.")
+
+    def of(self, chute: Chute) -> float:
+        """Its value."""
+        if self.key in BY_KEY:
+            return getattr(chute, BY_KEY[self.key].name)
+        where, _, name = self.key.partition(".")
+        if where == "base":
+            return getattr(base(chute.base), name)
+        value = chute.law.parameters[name]
+        return chute.law.densest if value is None else value
+
+    def given(self, chute: Chute, value: float) -> dict[str, Any]:
+        """Arguments of a Chute with which it has another value.
+
+        Raises:
+            InputError: for a value out of range.
+        """
+        if self.key in BY_KEY:
+            return {BY_KEY[self.key].name: value}
+        where, _, name = self.key.partition(".")
+        if where == "base":
+            return {"base": replace(base(chute.base), **{name: value})}
+        return {"closure": chute.law.configured(**{name: value})}
+
+
+def varied(chute: Chute, free: Sequence[FreeParameter], values: Sequence[float]) -> Chute:
+    """``chute`` with other ``values`` of some of its parameters.
+
+    Raises:
+        InputError: for a value out of range.
+    """
+    for parameter, value in zip(free, values, strict=True):
+        chute = replace(chute, **parameter.given(chute, float(value)))
+    return chute
+
+
+def all_free(chute: Chute) -> tuple[FreeParameter, ...]:
+    """All numbers of ``chute`` that can be varied: a base in which the roughness does not enter has none."""
+    keys = [key for key in BY_KEY if key != "roughness" or base(chute.base).name == "richman"]
+    law, on = chute.law, base(chute.base)
+    if law.known:
+        keys += [f"closure.{name}" for name in law.parameters if _can_vary(chute, name)]
+    keys += [f"base.{name}" for name in on.parameters]
+    return tuple(_free(chute, key) for key in keys)
+
+
+def free_parameter(chute: Chute, asked: str) -> FreeParameter:
+    """The parameter of ``chute`` that is called ``asked``.
+
+    Raises:
+        InputError: for none or several.
+    """
+    known = {parameter.key: parameter for parameter in all_free(chute)}
+    names = {parameter.name: key for key, parameter in BY_KEY.items()}
+    key = names.get(asked, asked)
+    if key in known:
+        return known[key]
+    found = [key for key in known if key.partition(".")[2] == asked]
+    if len(found) == 1:
+        return known[found[0]]
+    if found:
+        raise InputError(f"parameter {shown(asked)}: it is {' or '.join(found)}; say which")
+    raise InputError(f"unknown parameter {shown(asked)}: choose from {', '.join(known)}")
+
+
+def _free(chute: Chute, key: str) -> FreeParameter:
+    if key in BY_KEY:
+        return FreeParameter(key, BY_KEY[key].low, BY_KEY[key].high, _LIKELY[key])
+    if key == "closure.packing":
+        (low, high), likely = _RANGES[key]
+        low = max((low, *chute.law.breaks_at(chute.restitution, chute.slope)))
+        return FreeParameter(key, low, high, (max(likely[0], low), likely[1]))
+    bounds, likely = _RANGES.get(key, ((-math.inf, math.inf), (math.nan, math.nan)))
+    if key not in _RANGES:
+        now = FreeParameter(key, *bounds, likely).of(chute)
+        likely = (0.5 * now, 2.0 * now) if now else (-1.0, 1.0)
+    return FreeParameter(key, *bounds, likely)
+
+
+def _can_vary(chute: Chute, name: str) -> bool:
+    """Whether a parameter of the law is a number that may take other values."""
+    value = chute.law.parameters[name]
+    if isinstance(value, (str, bool)):
+        return False
+    if name != "packing":
+        return isinstance(value, float)
+    try:
+        chute.law.configured(packing=0.999 * chute.law.densest)
+    except InputError:
+        return False
+    return True
