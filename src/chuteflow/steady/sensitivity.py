@@ -303,6 +303,14 @@ def _at_height(rates: dict[str, Array], steep: dict[str, Array]) -> dict[str, Ar
     return {name: rates[name] + steep[name] * share if name != "height" else np.zeros_like(share) for name in FIELDS}
 
 
+def slopes_in_height(flow: Flow, z: Array) -> dict[str, Array]:
+    """Derivatives of all fields of ``flow`` with respect to height, at heights ``z`` (m,) that are in the flow."""
+    start = _Start(flow)
+    with np.errstate(under="ignore"):
+        steep = start.steepness(start.shares_at(z))
+    return {name: values / steep["height"] for name, values in steep.items()}
+
+
 @on_one_thread
 def sensitivity(flow: Flow, parameters: Sequence[str] | None = None, *, at: str = "Q") -> Sensitivity:
     """Exact derivatives of ``flow`` with respect to ``parameters`` of its chute, all that can be varied by default.
