@@ -23,14 +23,20 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, free_parameter, varied
 from chuteflow.threads import on_one_thread
 
-#: Evaluations in a first fit from each start, and in the last.
-_FIRST, _LAST = 15, 60
+#: Evaluations in a first fit from each start, in a second one of those that may be the best, and in the last; and the
+#: tolerances of their sums of squares.
+_FIRST, _SECOND, _LAST = 6, 20, 60
+_ROUGHLY, _CLOSELY = 1e-3, 1e-8
+#: First fits that are this many times worse than the best are given up.
+_HOPELESS = 30.0
 #: Confidence of intervals unless another is asked for.
 CONFIDENCE = 0.95
 #: Rounds in which intervals come upon a better fit.
 _ROUNDS = 4
-#: Parameters of two fits that differ by less, in their errors, are the same.
-_SAME = 0.1
+#: Parameters of two fits that differ by less, in their errors, are the same; flows by less in ln Q, h, M and T.
+_SAME, _SAME_FLOW = 0.2, 0.3
+#: Fits whose parameters differ by less, in their likely ranges, lead to the same minimum.
+_NEAR = 0.05
 
 
 @dataclass(frozen=True)
@@ -247,7 +253,8 @@ def fit(
             raise BetterFit(better)
         except BetterFit as found:
             others.append(best)
-            best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST) or found.found
+            best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST, tolerance=_CLOSELY)
+            best = best or found.found
     else:
         raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
@@ -291,14 +298,35 @@ def _searched(objective: Objective, first: list[Array], trials: int | None) -> t
     """The best fit, and the other minima that starts led to."""
     found = []
     for start in candidates(objective, first, trials):
-        one = objective.minimise(objective.start(start.places), start.places, most=_FIRST, tolerance=1e-6)
+        one = objective.minimise(objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY)
         if one is not None:
             found.append(one)
     if not found:
         raise SolveError("no trial flow could be followed to a fit: give ranges nearer to the answer")
     found.sort(key=lambda one: one.chi2)
-    best = objective.minimise(found[0].x.copy(), found[0].places, most=_LAST) or found[0]
-    return best, found[1:]
+    kept: list[Minimum] = []
+    for one in found:
+        hopeless = kept and one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
+        if hopeless or any(_near(objective, one, other) for other in kept):
+            continue
+        kept.append(objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one)
+        kept.sort(key=lambda one: one.chi2)
+    best = objective.minimise(kept[0].x.copy(), kept[0].places, most=_LAST, tolerance=_CLOSELY) or kept[0]
+    return best, kept[1:]
+
+
+def _near(objective: Objective, one: Minimum, other: Minimum) -> bool:
+    """Whether two fits are on one way to one minimum: the same flows at almost the same parameters."""
+    k = objective.parameters
+    apart = np.abs(one.x[:k] - other.x[:k]) / objective.scale()[:k]
+    return bool(apart.max(initial=0.0) < _NEAR) and _same_flows(one, other)
+
+
+def _same_flows(one: Minimum, other: Minimum) -> bool:
+    return all(
+        np.abs(a.flow.solution.macroscopic - b.flow.solution.macroscopic).max() < _SAME_FLOW
+        for a, b in zip(one.places, other.places, strict=True)
+    )
 
 
 def _on_other_flows(objective: Objective, best: Minimum, rise: float) -> Minimum | None:
@@ -315,7 +343,7 @@ def _on_other_flows(objective: Objective, best: Minimum, rise: float) -> Minimum
             if float(there @ there) < float(now[i] @ now[i]) * (1.0 - 1e-6) - 1e-6:
                 swapped[i] = place
         if any(a is not b for a, b in zip(swapped, best.places, strict=True)):
-            found = objective.minimise(objective.start(swapped), swapped, most=_FIRST)
+            found = objective.minimise(objective.start(swapped), swapped, most=_SECOND, tolerance=_ROUGHLY)
             if found is not None and found.chi2 < best.chi2 * (1.0 - 1e-3):
                 return found
     return None
@@ -408,14 +436,16 @@ def _rank(case: Case, place: Place) -> tuple[int, int]:
 def _alternatives(
     objective: Objective, best: Minimum, others: Sequence[Minimum], error: Array, rise: float
 ) -> list[Alternative]:
-    """Minima that differ from the best one, and from one another; those that may fit as well are followed to the end."""
+    """Minima that differ from the best one and from one another; what may fit as well is followed to the end."""
     found: list[Alternative] = []
     kept = [best]
     k = objective.parameters
     for one in sorted(others, key=lambda m: m.chi2):
         if one.chi2 > best.chi2 + 4.0 * rise + 0.5 * best.chi2:
             continue
-        ended = objective.minimise(one.x.copy(), one.places, most=_LAST) or one
+        if any(_same(objective, one, other, error) for other in kept):
+            continue
+        ended = objective.minimise(one.x.copy(), one.places, most=_LAST, tolerance=1e-6) or one
         if any(_same(objective, ended, other, error) for other in kept):
             continue
         kept.append(ended)
@@ -425,10 +455,7 @@ def _alternatives(
                 ended.chi2,
                 tuple(place.flow for place in ended.places),
                 ended.chi2 <= best.chi2 + rise,
-                all(
-                    np.abs(a.flow.solution.macroscopic - b.flow.solution.macroscopic).max() < 0.3
-                    for a, b in zip(ended.places, best.places, strict=True)
-                ),
+                _same_flows(ended, best),
             )
         )
     return found
@@ -437,4 +464,4 @@ def _alternatives(
 def _same(objective: Objective, one: Minimum, other: Minimum, error: Array) -> bool:
     k = objective.parameters
     near = np.abs(one.x[:k] - other.x[:k]) <= np.maximum(_SAME * error[:k], 1e-3 * objective.scale()[:k])
-    return bool(near.all()) and abs(one.chi2 - other.chi2) < 1e-2 * (1.0 + other.chi2)
+    return bool(near.all()) and abs(one.chi2 - other.chi2) < 3e-2 * (1.0 + other.chi2)

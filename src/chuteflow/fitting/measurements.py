@@ -1,8 +1,8 @@
 """Measurements of steady flows, checked and dimensionless: profiles, numbers, and their errors.
 
-An error is absolute, or a fraction of the true value. Relative errors are compared in logarithms, so that the scatter of
-a measurement does not decide on its weight. Where no errors are given at all, they are taken to be one unknown fraction
-of every value, which the residuals of a fit then estimate.
+An error is absolute, or a fraction of the true value. Relative errors are compared in logarithms, so that the scatter
+of a measurement does not decide on its weight. Where no errors are given at all, they are taken to be one unknown
+fraction of every value, which the residuals of a fit then estimate.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class Scalar:
 class Experiment:
     """What was measured of one flow.
 
-    ``given`` are parameters of its chute, by key, that are known; ``exact`` is at most one of Q, M, h and T_surface that
-    is known without error, and then picks the flow; all is dimensionless.
+    ``given`` are parameters of its chute, by key, that are known; ``exact`` is at most one of Q, M, h and T_surface
+    that is known without error, and then picks the flow; all is dimensionless.
     """
 
     name: str

@@ -30,8 +30,8 @@ class Minimum:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """Residuals of all ``cases`` as a function of the unknowns x (p,): free parameters, places of flows without an exact
-    number, and heights of the bases where they are unknown."""
+    """Residuals of all ``cases`` as a function of the unknowns x (p,): free parameters, places of flows without an
+    exact number, and heights of the bases where they are unknown."""
 
     cases: tuple[Case, ...]
     base_unknown: bool

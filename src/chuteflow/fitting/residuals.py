@@ -18,7 +18,7 @@ import numpy as np
 
 from chuteflow.branches.enumeration import flows
 from chuteflow.errors import InputError
-from chuteflow.fitting.measurements import Experiment
+from chuteflow.fitting.measurements import Experiment, Series
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
@@ -78,6 +78,17 @@ class Case:
         for key, value in self.experiment.exact.items():
             return Condition.fix(WHICH[key], value)
         return None
+
+    @cached_property
+    def _by_heights(self) -> list[tuple[Array, list[Series]]]:
+        """The profiles, those together that follow one another at the same heights."""
+        found: list[tuple[Array, list[Series]]] = []
+        for series in self.experiment.profiles:
+            if found and np.array_equal(found[-1][0], series.height):
+                found[-1][1].append(series)
+            else:
+                found.append((series.height, [series]))
+        return found
 
     def at(self, values: Array) -> Chute:
         """Its chute with other values of the free parameters.
@@ -143,13 +154,16 @@ class Case:
         ``base`` is the height of the base where the heights of the measurements begin.
         """
         parts = []
-        for series in self.experiment.profiles:
-            z = series.height - base
-            inside = _inside(flow, z)
-            computed = getattr(flow.profile(inside), series.field)
-            if np.any(z != inside):
-                computed = computed + slopes_in_height(flow, inside)[series.field] * (z - inside)
-            parts.append(_residual(computed, series.value, series.error, series.relative))
+        for z, group in self._by_heights:
+            at = z - base
+            inside = _inside(flow, at)
+            profile = flow.profile(inside)
+            steep = slopes_in_height(flow, inside) if np.any(at != inside) else None
+            for series in group:
+                computed = getattr(profile, series.field)
+                if steep is not None:
+                    computed = computed + steep[series.field] * (at - inside)
+                parts.append(_residual(computed, series.value, series.error, series.relative))
         for scalar in self.experiment.scalars:
             computed = np.array([getattr(flow, scalar.name)])
             parts.append(_residual(computed, np.array([scalar.value]), np.array([scalar.error]), scalar.relative))
@@ -159,18 +173,20 @@ class Case:
         """The residual and its derivatives at the flow of ``place``."""
         answer = place.answer
         parts, by_parameters, by_place, by_base = [], [], [], []
-        for series in self.experiment.profiles:
-            z = series.height - base
-            inside = _inside(place.flow, z)
-            steep = slopes_in_height(place.flow, inside)[series.field]
+        for z, group in self._by_heights:
+            at = z - base
+            inside = _inside(place.flow, at)
+            steep = slopes_in_height(place.flow, inside)
             along, across = answer.profile_along(inside)
-            computed = getattr(place.flow.profile(inside), series.field) + steep * (z - inside)
-            scale = 1.0 / (series.error * (computed if series.relative else 1.0))
-            parts.append(_residual(computed, series.value, series.error, series.relative))
-            to_parameters, to_place = place.held(along[series.field], across[series.field])
-            by_parameters.append((to_parameters * scale).T)
-            by_place.append(to_place * scale)
-            by_base.append(-steep * scale)
+            profile = place.flow.profile(inside)
+            for series in group:
+                computed = getattr(profile, series.field) + steep[series.field] * (at - inside)
+                scale = 1.0 / (series.error * (computed if series.relative else 1.0))
+                parts.append(_residual(computed, series.value, series.error, series.relative))
+                to_parameters, to_place = place.held(along[series.field], across[series.field])
+                by_parameters.append((to_parameters * scale).T)
+                by_place.append(to_place * scale)
+                by_base.append(-steep[series.field] * scale)
         if self.experiment.scalars:
             along_all, across_all = answer.numbers_along
         for scalar in self.experiment.scalars:

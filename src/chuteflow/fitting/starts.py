@@ -66,10 +66,7 @@ def at(objective: Objective, values: Array) -> list[Candidate]:
         options.append([(costs[i], flows[i], ranks[i]) for i in order if np.isfinite(costs[i])])
         if not options[-1]:
             return []
-    if len(options) == 1:
-        picked = [[one] for one in options[0]]
-    else:
-        picked = [[one[0] for one in options]]
+    picked = [[one] for one in options[0]] if len(options) == 1 else [[one[0] for one in options]]
     return [
         Candidate(
             values,

@@ -199,7 +199,8 @@ class Sensitivity:
         """Derivatives (k,) of every number of the registry at the fixed quantity; infinite at its fold, NaN for the
         height of an interface that is not there."""
         along, across = self.numbers_along
-        return {name: self._combined(along[name], across[name]) for name in NUMBERS}
+        found = {name: self._combined(along[name], across[name]) for name in NUMBERS}
+        return found | {CONDITIONS[self.at].quantity: np.zeros(len(self.parameters))}
 
     @cached_property
     def numbers_along(self) -> tuple[dict[str, float], dict[str, Array]]:
