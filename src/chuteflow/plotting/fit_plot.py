@@ -27,10 +27,9 @@ def plot_fit(found: Fit) -> Figure:
         above, below = axes[column], axes[len(symbols) + column]
         _profiles(above, found, symbol)
         _residuals(below, found, symbol)
-        style.name_axes(above, style.label(PROFILES[symbol][0]), "height, $z$" if column == 0 else None)
-        style.name_axes(
-            below, f"residual of ${symbol_latex(symbol)}$ in errors", "height, $z$" if column == 0 else None
-        )
+        height = style.label("height") if column == 0 else None
+        style.name_axes(above, style.label(PROFILES[symbol][0]), height)
+        style.name_axes(below, f"residual of ${symbol_latex(symbol)}$ in errors", height)
     if len(found.experiments) > 1:
         style.legend(figure, loc="outside upper center", ncols=min(len(found.experiments), 5))
     said = ", ".join(f"${p.latex} = {one.value:.3g}$" for p, one in zip(found.free, found.estimates, strict=True))

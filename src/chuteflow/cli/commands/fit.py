@@ -150,13 +150,11 @@ def _report(found: Comparison) -> Iterator[str]:
     yield from _goodness(best)
     for one in best.experiments:
         flow = one.flow
-        base = (
-            "" if one.base is None else f", base at {tables.number(one.base)} +- {tables.number(one.base_error or 0)}"
-        )
-        yield (
-            f"experiment {one.name}: flow {one.rank} of {one.flows} ({flow.name}), Q = {tables.number(flow.mass_flux)}, "
-            f"h = {tables.number(flow.centre_of_mass)}, M = {tables.number(flow.mass_holdup)}{base}"
-        )
+        place = f"flow {one.rank} of {one.flows} ({flow.name}), Q = {tables.number(flow.mass_flux)}"
+        more = f"h = {tables.number(flow.centre_of_mass)}, M = {tables.number(flow.mass_holdup)}"
+        if one.base is not None:
+            more += f", base at {tables.number(one.base)} +- {tables.number(one.base_error or 0.0)}"
+        yield f"experiment {one.name}: {place}, {more}"
     for other in best.alternatives:
         if not other.fits_as_well:
             at = ", ".join(f"{p.key} = {tables.number(v)}" for p, v in zip(best.free, other.values, strict=True))
