@@ -25,7 +25,7 @@ from chuteflow.threads import on_one_thread
 
 #: Evaluations in a first fit from each start, in a second one of those that may be the best, and in the last; and the
 #: tolerances of their sums of squares.
-_FIRST, _SECOND, _LAST = 6, 20, 60
+_FIRST, _SECOND, _LAST = 5, 20, 60
 _ROUGHLY, _CLOSELY = 1e-3, 1e-8
 #: First fits that are this many times worse than the best are given up.
 _HOPELESS = 30.0

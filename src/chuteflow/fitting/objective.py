@@ -14,6 +14,8 @@ from chuteflow.numerics.chebyshev import Array
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 #: The place on the branch, a sum of logarithms, changes about so much in a step.
 _PLACE_SCALE, _BASE_SCALE = 0.3, 0.3
+#: A residual beyond this is that of a flow where there is none.
+_LARGEST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +137,7 @@ class _Run:
         for i, (case, place) in enumerate(zip(self.objective.cases, places, strict=True)):
             parts.append(case.residual(place.flow, self._base(i)))
         found = np.concatenate(parts)
-        return np.where(np.isfinite(found), found, np.inf)
+        return np.where(np.abs(found) < _LARGEST, found, np.inf)
 
     def jacobian(self, part: Array) -> Array:
         """Their derivatives (n, moving unknowns); the flows are followed from here on."""

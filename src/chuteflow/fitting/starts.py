@@ -16,7 +16,9 @@ from chuteflow.numerics.sobol import MOST_DIMENSIONS, Sobol
 #: Trial chutes, where there is one experiment, and at least where there are several.
 _TRIALS, _FEWEST = 64, 16
 #: Candidates that are followed to a minimum at most, and how far apart they are, in ranges of the parameters.
-_FOLLOWED, _APART = 6, 0.15
+_FOLLOWED, _APART = 4, 0.15
+#: Residuals of flows that nothing can be learnt from, such as those with no grains where some were measured.
+_SENSELESS = 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,8 @@ def at(objective: Objective, values: Array) -> list[Candidate]:
 
 
 def _cost(residual: Array) -> float:
-    return float(np.log1p(residual**2).sum()) if np.isfinite(residual).all() else np.inf
+    sensible = np.isfinite(residual).all() and np.abs(residual).max(initial=0.0) < _SENSELESS
+    return float(np.log1p(residual**2).sum()) if sensible else np.inf
 
 
 def _distinct(found: Sequence[Candidate], width: Array) -> list[Candidate]:
