@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from chuteflow.fitting.objective import LOSSES, Minimum, Objective
 from chuteflow.fitting.residuals import Case, Place
 from chuteflow.fitting.starts import at, candidates
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, free_parameter, varied
@@ -27,6 +30,9 @@ from chuteflow.threads import on_one_thread
 #: tolerances of their sums of squares.
 _FIRST, _SECOND, _LAST = 5, 20, 60
 _ROUGHLY, _CLOSELY = 1e-3, 1e-8
+#: Relative errors that are allowed of a number that is known exactly, to pass through a fold of it: on the way to a
+#: fit, and for intervals. A fold is near where its logarithm changes by less per arclength of the branch.
+_LENIENT, _TIGHT, _FLAT = 0.01, 0.002, 0.15
 #: First fits that are this many times worse than the best are given up.
 _HOPELESS = 30.0
 #: Confidence of intervals unless another is asked for.
@@ -94,6 +100,32 @@ class Alternative:
     flows: tuple[Flow, ...]
     fits_as_well: bool
     same_flow: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What is known of a chute: its parameters, of which those called ``keys`` have the ``covariance`` (k, k), and
+    those in ``undetermined`` are not determined by what was measured."""
+
+    chute: Chute
+    keys: tuple[str, ...]
+    covariance: Array
+    undetermined: tuple[str, ...] = ()
+
+    def varied(self, **changes: Any) -> Calibration:
+        """The same with other parameters of the chute, by their names in :class:`chuteflow.Chute`, then known.
+
+        Raises:
+            InputError: for a value out of range.
+        """
+        known = {key for key, parameter in BY_KEY.items() if parameter.name in changes}
+        kept = [i for i, key in enumerate(self.keys) if key not in known]
+        return Calibration(
+            replace(self.chute, **changes),
+            tuple(self.keys[i] for i in kept),
+            self.covariance[np.ix_(kept, kept)],
+            tuple(key for key in self.undetermined if key not in known),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,9 +230,11 @@ class Fit:
                 said.append(f"{kind} at {where or 'these parameters'} fits as well: chi2 = {other.chi2:.4g}")
         return said
 
-    def chute_at(self, experiment: int = 0) -> Chute:
-        """The chute of an experiment at the estimate."""
-        return self.experiments[experiment].flow.chute
+    @property
+    def calibration(self) -> Calibration:
+        """What predictions are made from."""
+        left = tuple(one.key for one in self.estimates if not one.determined)
+        return Calibration(self.chute, tuple(p.key for p in self.free), self.covariance, left)
 
 
 @on_one_thread
@@ -246,7 +280,7 @@ def fit(
         scale, covariance = _spread(objective, best, measured.errors_known)
         rise = _rise(confidence, objective.count - objective.unknowns, scale, measured.errors_known)
         try:
-            intervals = [interval(objective, best, covariance, j, rise) for j in range(len(parameters))]
+            intervals = _intervals(objective, best, covariance, rise, measured.errors_known)
             better = _on_other_flows(objective, best, rise)
             if better is None:
                 break
@@ -311,8 +345,65 @@ def _searched(objective: Objective, first: list[Array], trials: int | None) -> t
             continue
         kept.append(objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one)
         kept.sort(key=lambda one: one.chi2)
+    beyond = _beyond_fold(objective, kept[0])
+    if beyond is not None:
+        kept = sorted([beyond, *kept], key=lambda one: one.chi2)
     best = objective.minimise(kept[0].x.copy(), kept[0].places, most=_LAST, tolerance=_CLOSELY) or kept[0]
     return best, kept[1:]
+
+
+def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objective, Minimum] | None:
+    """The objective with numbers that are known exactly known to a relative ``error``, whose flows pass through folds
+    of them; and its minimum near ``one``."""
+    relaxed = replace(objective, cases=tuple(case.relaxed(error) for case in objective.cases))
+    values = one.x[: objective.parameters]
+    places = [Place.of(case, place.flow, values) for case, place in zip(relaxed.cases, one.places, strict=True)]
+    x = relaxed.start(places)
+    if objective.base_unknown:
+        x[-len(places) :] = one.x[-len(places) :]
+    found = relaxed.minimise(x, places, most=_LAST, tolerance=_ROUGHLY)
+    return None if found is None else (relaxed, found)
+
+
+def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
+    """The minimum that is reached through a fold of a number that is known exactly, where one is near; else None."""
+    flat = [
+        abs(float(np.array(place.weights) @ place.answer.tangent)) < _FLAT
+        for case, place in zip(objective.cases, one.places, strict=True)
+        if case.exact is not None
+    ]
+    around = _relaxed(objective, one, _LENIENT) if any(flat) else None
+    if around is None:
+        return None
+    found = around[1]
+    values = found.x[: objective.parameters]
+    places = []
+    for case, place in zip(objective.cases, found.places, strict=True):
+        start = Place.of(case, place.flow, values)
+        flow = case.followed(start, values, start.label)
+        if flow is None:
+            return None
+        places.append(start.moved(flow, values, start.label))
+    x = objective.start(places)
+    if objective.base_unknown:
+        x[-len(places) :] = found.x[-len(places) :]
+    return objective.minimise(x, places, most=_SECOND, tolerance=_ROUGHLY)
+
+
+def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: float, known: bool) -> list[Interval]:
+    """The intervals of all parameters; where no flow with an exact number goes on, with that number relaxed."""
+    found = []
+    around: tuple[Objective, Minimum] | None = None
+    for j in range(objective.parameters):
+        one = interval(objective, best, covariance, j, rise)
+        if "no flow" in one.ends and any(case.exact for case in objective.cases):
+            around = around or _relaxed(objective, best, _TIGHT)
+            if around is not None:
+                _, spread = _spread(*around, known)
+                with suppress(BetterFit):
+                    one = one.continued(interval(*around, spread, j, rise))
+        found.append(one)
+    return found
 
 
 def _near(objective: Objective, one: Minimum, other: Minimum) -> bool:

@@ -23,7 +23,7 @@ ENDS = {
 #: The root of the rise is found to this; steps and bisections at most.
 _CLOSE, _STEPS, _BISECTIONS = 0.02, 9, 4
 #: Evaluations in each fit with a fixed parameter, and its tolerance.
-_MOST, _TOLERANCE = 12, 1e-4
+_MOST, _TOLERANCE = 25, 1e-4
 #: A sum of squares that is lower by this part of the rise is a better fit.
 _BETTER = 0.03
 
@@ -40,6 +40,12 @@ class Interval:
     def bounded(self) -> bool:
         """Whether the data end it at both sides."""
         return self.ends == ("crossed", "crossed")
+
+    def continued(self, other: Interval) -> Interval:
+        """This one, with the ends of ``other`` where its own is that no flow goes on."""
+        low, low_end = (other.low, other.ends[0]) if self.ends[0] == "no flow" else (self.low, self.ends[0])
+        high, high_end = (other.high, other.ends[1]) if self.ends[1] == "no flow" else (self.high, self.ends[1])
+        return Interval(min(low, self.low), max(high, self.high), (low_end, high_end))
 
     @property
     def open(self) -> bool:
@@ -79,6 +85,10 @@ class _Side:
 
     def end(self) -> tuple[float, str]:
         """Where the interval ends, and how."""
+        place, how = self._end()
+        return float(place), how
+
+    def _end(self) -> tuple[float, str]:
         here = float(self.best.x[self.which])
         bound = float(self.objective.bounds()[int(self.sign > 0.0)][self.which])
         widest = self.objective.scale()[self.which] * 4.0

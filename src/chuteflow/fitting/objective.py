@@ -106,10 +106,12 @@ class Objective:
             return None
         if not moving:
             return Minimum(x, float(first @ first), np.empty((len(first), 0)), run.places, True)
-        found = least_squares(
-            run.residual, x[moving], run.jacobian, bounds=(low[moving], high[moving]), x_scale=self.scale()[moving],
-            loss=self.loss, max_nfev=most, ftol=tolerance, xtol=tolerance, gtol=1e-12,
-        )  # fmt: skip
+        # Flows far from the measurements have derivatives that no longer mean anything.
+        with np.errstate(all="ignore"):
+            found = least_squares(
+                run.residual, x[moving], run.jacobian, bounds=(low[moving], high[moving]),
+                x_scale=self.scale()[moving], loss=self.loss, max_nfev=most, ftol=tolerance, xtol=tolerance, gtol=1e-12,
+            )  # fmt: skip
         whole = x.copy()
         whole[moving] = found.x
         run.residual(found.x)
@@ -156,7 +158,7 @@ class _Run:
                 if column is not None:
                     out[rows, column] = values
             row = rows.stop
-        return out[:, self.moving]
+        return np.where(np.isfinite(out), out, 0.0)[:, self.moving]
 
     def accepted(self, part: Array) -> tuple[Place, ...]:
         """The flows at these unknowns, followed from where they were accepted; none where one is not found."""

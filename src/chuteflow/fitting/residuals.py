@@ -18,7 +18,7 @@ import numpy as np
 
 from chuteflow.branches.enumeration import flows
 from chuteflow.errors import InputError
-from chuteflow.fitting.measurements import Experiment, Series
+from chuteflow.fitting.measurements import Experiment, Scalar, Series
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
@@ -71,6 +71,12 @@ class Case:
                 raise InputError(f"{key} is free, and experiment {experiment.name} gives it: leave one of them out")
         own = {BY_KEY[key].name: value for key, value in experiment.given.items()}
         return cls(experiment, replace(chute, **own), tuple(free))
+
+    def relaxed(self, error: float) -> Case:
+        """The same with the number that is known exactly known to a relative ``error``."""
+        experiment = self.experiment
+        more = tuple(Scalar(key, value, error, True) for key, value in experiment.exact.items())
+        return replace(self, experiment=replace(experiment, scalars=(*more, *experiment.scalars), exact={}))
 
     @cached_property
     def exact(self) -> Condition | None:

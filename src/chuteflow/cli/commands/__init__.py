@@ -10,6 +10,7 @@ COMMANDS = {
     "sweep": "The flows of very many chutes, as a study says, into a Zarr store.",
     "sensitivities": "How every quantity of a flow answers to each parameter of its chute, exactly.",
     "fit": "The parameters of a chute from measurements, with their uncertainties.",
+    "predict": "Flows of a fitted chute with bands, also at another slope.",
     "closures": "The constitutive laws that there are, their parameters, and the functions of one of them.",
     "compare-closures": "The flows of one chute under several constitutive laws, side by side.",
     "figures": "Draw figures of the paper.",
