@@ -13,6 +13,7 @@ import numpy as np
 from chuteflow import display
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError, SolveError
+from chuteflow.fitting.direct import DirectMeasurement, direct
 from chuteflow.fitting.identifiability import trade_offs
 from chuteflow.fitting.intervals import BetterFit, Interval, interval
 from chuteflow.fitting.measurements import Measurements, Series
@@ -203,6 +204,16 @@ class Fit:
         from scipy.special import chdtrc
 
         return float(chdtrc(self.freedom, self.chi2))
+
+    @cached_property
+    def direct(self) -> tuple[DirectMeasurement, ...]:
+        """What the experiments with profiles of nu and T say of g1, g2 and the slip without a model."""
+        found = []
+        for one, experiment in zip(self.experiments, self.measured.experiments, strict=True):
+            scale = 1.0 if self.measured.errors_known else self.error_scale
+            with suppress(InputError):
+                found.append(direct(experiment, one.flow.chute, error_scale=scale))
+        return tuple(found)
 
     @property
     def trade_offs(self) -> list[str]:

@@ -20,6 +20,7 @@ from chuteflow.steady.quantities import FIELDS, NUMBERS
 
 if TYPE_CHECKING:
     from chuteflow.fitting.calibration import Fit, Fitted
+    from chuteflow.fitting.direct import DirectMeasurement
     from chuteflow.fitting.prediction import Prediction
 
 #: Endings of the files, the name of their kind, and bytes in one at most.
@@ -58,6 +59,7 @@ def fit_object(found: Fit) -> dict[str, Any]:
         "converged": found.converged,
         "warnings": found.warnings,
         "experiments": [_experiment(one) for one in found.experiments],
+        "direct": [_direct(one) for one in found.direct],
         "alternatives": [
             {
                 "values": dict(zip((p.key for p in found.free), one.values.tolist(), strict=True)),
@@ -143,6 +145,21 @@ def _experiment(one: Fitted) -> dict[str, Any]:
             for series, residual in one.profiles
         },
         "scalar_residuals": one.residuals[sum(len(r) for _, r in one.profiles) :].tolist(),
+    }
+
+
+def _direct(one: DirectMeasurement) -> dict[str, Any]:
+    parts = {"g1": one.g1, "g2": one.g2, "slip_ratio": one.slip}
+    return {
+        "name": one.name,
+        "z": one.height.tolist(),
+        "nu": one.nu.tolist(),
+        **{
+            name: None
+            if part is None
+            else {"value": _numbers(part.value), "error": _numbers(part.error), "law": _numbers(part.law)}
+            for name, part in parts.items()
+        },
     }
 
 

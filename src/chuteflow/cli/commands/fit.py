@@ -59,10 +59,14 @@ class Range(click.ParamType):
 @options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @options.option("--plot", metavar="FILE", help="Draw measurements, fit and residuals into FILE: .png, .pdf or .svg.")
+@options.option(
+    "--direct", metavar="FILE", help="Draw g1 and g2 as measured without a model, beside the law, into FILE."
+)
 @options.option("--out", "--save", "save", metavar="FILE", help="Write the fit to FILE: .nc or .json, for predictions.")
 def command(**given: Any) -> None:
     """Read, fit, print, save and draw."""
     options.require_outputs(given, (".nc", ".json"))
+    options.require_outputs({"save": None, "plot": given["direct"]})
     free = _names(given["free"])
     closures = _closures(given)
     chute = _chute(given, free, closures[0])
@@ -94,7 +98,15 @@ def command(**given: Any) -> None:
 
         return plot_fit(found.fits[0])
 
-    options.deliver(given, answer, save, plotted)
+    def drawn() -> Figure:
+        from chuteflow.plotting.direct_plot import plot_direct
+
+        measured_directly = found.fits[0].direct
+        if not measured_directly:
+            raise InputError("--direct: no experiment has profiles of nu and T at five common heights")
+        return plot_direct(measured_directly)
+
+    options.deliver(given, answer, save, plotted, direct=drawn)
 
 
 def _names(text: str | None) -> list[str]:
@@ -161,6 +173,10 @@ def _report(found: Comparison) -> Iterator[str]:
             yield f"another fit is worse: chi2 = {other.chi2:.4g} at {at}"
     yield ""
     yield from _residuals(best)
+    if best.direct:
+        yield ""
+        yield "measured without a model, by the weight of the grains above; and how many errors the law is above it:"
+        yield from _direct(best)
     if best.warnings:
         yield ""
         yield from best.warnings
@@ -209,4 +225,22 @@ def _residuals(best: Fit) -> Iterator[str]:
         values = one.residuals[len(one.residuals) - len(scalars) :]
         for scalar, value in zip(scalars, values, strict=True):
             rows.append([f"{one.name}: {scalar.symbol}", f"{value:+.2f}", *[""] * (_BANDS - 1), ""])
+    yield tables.table(rows, words=(0,))
+
+
+def _direct(best: Fit) -> Iterator[str]:
+    """Where g1, g2 and the slip were measured: the lowest height, the middle and the highest."""
+    from chuteflow.io import tables
+
+    rows = [["", "z", "nu", "g1", "+-", "law", "g2", "+-", "law", "slip", "+-", "law"]]
+    for one in best.direct:
+        for i in sorted({0, len(one.height) // 4, len(one.height) // 2, 3 * len(one.height) // 4}):
+            row = [one.name, tables.number(float(one.height[i])), tables.number(float(one.nu[i]))]
+            for measured in (one.g1, one.g2, one.slip if i == 0 else None):
+                if measured is None:
+                    row += ["", "", ""]
+                else:
+                    row += [tables.number(float(measured.value[i])), f"{measured.error[i]:.2g}"]
+                    row.append(f"{measured.deviation[i]:+.1f}")
+            rows.append(row)
     yield tables.table(rows, words=(0,))
