@@ -24,7 +24,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.free import FreeParameter, free_parameter, varied
+from chuteflow.steady.free import FreeParameter, chosen_parameters, varied
 from chuteflow.threads import on_one_thread
 
 #: Evaluations in a first fit from each start, in a second one of those that may be the best, and in the last; and the
@@ -279,7 +279,7 @@ def fit(
     if loss not in LOSSES:
         raise InputError(f"loss {shown(loss)}: choose one of {', '.join(LOSSES)}")
     confidence = number("confidence", confidence, 0.5, 0.9999)
-    parameters = _parameters(chute, free, ranges or {})
+    parameters = chosen_parameters(chute, free, ranges or {})
     if measured.in_units and any(parameter.key == "slope" for parameter in parameters):
         raise InputError("the slope is free, and makes the measurements dimensionless: give them without units")
     cases = tuple(Case.of(experiment, chute, parameters) for experiment in measured.experiments)
@@ -303,25 +303,6 @@ def fit(
     else:
         raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
-
-
-def _parameters(
-    chute: Chute, free: Sequence[str], ranges: Mapping[str, tuple[float, float]]
-) -> tuple[FreeParameter, ...]:
-    found = tuple(free_parameter(chute, name) for name in free)
-    keys = [parameter.key for parameter in found]
-    if len(set(keys)) < len(keys):
-        raise InputError(f"free parameters {', '.join(keys)}: each once")
-    asked = {free_parameter(chute, name).key: pair for name, pair in ranges.items()}
-    for key, (low, high) in asked.items():
-        if key not in keys:
-            raise InputError(f"a range of {key} is given, which is not free")
-        parameter = found[keys.index(key)]
-        if not parameter.low <= low < high <= parameter.high:
-            raise InputError(
-                f"range {low:g} to {high:g} of {key}: must rise, and be within {parameter.low:g} to {parameter.high:g}"
-            )
-    return tuple(replace(p, likely=asked[p.key]) if p.key in asked else p for p in found)
 
 
 def _require_enough(objective: Objective) -> None:
@@ -376,14 +357,18 @@ def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objectiv
     return None if found is None else (relaxed, found)
 
 
-def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
-    """The minimum that is reached through a fold of a number that is known exactly, where one is near; else None."""
-    flat = [
+def _at_fold(objective: Objective, one: Minimum) -> bool:
+    """Whether a fold of a number that is known exactly is near."""
+    return any(
         abs(float(np.array(place.weights) @ place.answer.tangent)) < _FLAT
         for case, place in zip(objective.cases, one.places, strict=True)
         if case.exact is not None
-    ]
-    around = _relaxed(objective, one, _LENIENT) if any(flat) else None
+    )
+
+
+def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
+    """The minimum that is reached through a fold of a number that is known exactly, where one is near; else None."""
+    around = _relaxed(objective, one, _LENIENT) if _at_fold(objective, one) else None
     if around is None:
         return None
     found = around[1]
@@ -402,17 +387,28 @@ def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
 
 
 def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: float, known: bool) -> list[Interval]:
-    """The intervals of all parameters; where no flow with an exact number goes on, with that number relaxed."""
+    """The intervals of all parameters.
+
+    Where a fold of a number that is known exactly is near, that number is relaxed; so it is where no flow goes on.
+    """
+    near = _at_fold(objective, best)
+    around = _relaxed(objective, best, _TIGHT) if near else None
+    if around is not None and around[1].chi2 > best.chi2 + rise:
+        near, around = False, None
     found = []
-    around: tuple[Objective, Minimum] | None = None
     for j in range(objective.parameters):
-        one = interval(objective, best, covariance, j, rise)
-        if "no flow" in one.ends and any(case.exact for case in objective.cases):
+        one = None
+        if near and around is not None:
+            with suppress(BetterFit):
+                one = interval(*around, _spread(*around, known)[1], j, rise)
+        if one is None or "no flow" in one.ends:
+            exact = interval(objective, best, covariance, j, rise)
+            one = exact if one is None else one.continued(exact)
+        if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
             around = around or _relaxed(objective, best, _TIGHT)
             if around is not None:
-                _, spread = _spread(*around, known)
                 with suppress(BetterFit):
-                    one = one.continued(interval(*around, spread, j, rise))
+                    one = one.continued(interval(*around, _spread(*around, known)[1], j, rise))
         found.append(one)
     return found
 

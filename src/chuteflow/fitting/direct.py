@@ -1,7 +1,7 @@
 """What profiles say without a model: in a steady chute the stresses are known from the volume fraction alone.
 
-# notation: p normal stress, the integral of nu dz above; s slope, nu volume fraction, T granular temperature, u velocity;
-# g1 = p/T, g2 = s p/(sqrt(T) du/dz), and F1 = u/sqrt(T) at the base.
+# notation: p normal stress, the integral of nu dz above; s slope, nu volume fraction, T granular temperature, u
+# velocity; g1 = p/T, g2 = s p/(sqrt(T) du/dz), and F1 = u/sqrt(T) at the base.
 
 The normal stress is the weight of the grains above (3.4), and the shear stress s times that (3.5), whatever the grains
 are. Above the highest value nu falls off exponentially, at the rate of the values below. Errors come from many draws of

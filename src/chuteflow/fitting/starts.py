@@ -32,8 +32,11 @@ class Candidate:
     cost: float
 
 
-def candidates(objective: Objective, first: Sequence[Array], trials: int | None = None) -> list[Candidate]:
-    """Candidates from the parameters ``first`` and from trial chutes, the best first, without near repetitions.
+def candidates(
+    objective: Objective, first: Sequence[Array], trials: int | None = None, most: int = _FOLLOWED
+) -> list[Candidate]:
+    """Candidates from the parameters ``first`` and from trial chutes, the best first, without near repetitions: about
+    ``most`` of them.
 
     Raises:
         InputError: where no trial chute has flows for all experiments.
@@ -52,7 +55,7 @@ def candidates(objective: Objective, first: Sequence[Array], trials: int | None 
         raise InputError(
             "no flow like those measured on any of the trial chutes: check units and slope, or free other parameters"
         )
-    return _distinct(sorted(found, key=lambda one: one.cost), width)
+    return _distinct(sorted(found, key=lambda one: one.cost), width, most)
 
 
 def at(objective: Objective, values: Array) -> list[Candidate]:
@@ -85,7 +88,7 @@ def _cost(residual: Array) -> float:
     return float(np.log1p(residual**2).sum()) if sensible else np.inf
 
 
-def _distinct(found: Sequence[Candidate], width: Array) -> list[Candidate]:
+def _distinct(found: Sequence[Candidate], width: Array, most: int) -> list[Candidate]:
     """The best, those that are far from them or on another flow, and at least one of each rank."""
     kept: list[Candidate] = []
     for one in found:
@@ -94,6 +97,6 @@ def _distinct(found: Sequence[Candidate], width: Array) -> list[Candidate]:
             for other in kept
         )
         new = all(one.ranks != other.ranks for other in kept)
-        if not near and (len(kept) < _FOLLOWED or (new and len(kept) < 2 * _FOLLOWED)):
+        if not near and (len(kept) < most or (new and len(kept) < 2 * most)):
             kept.append(one)
     return kept

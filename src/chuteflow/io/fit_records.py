@@ -20,6 +20,7 @@ from chuteflow.steady.quantities import FIELDS, NUMBERS
 
 if TYPE_CHECKING:
     from chuteflow.fitting.calibration import Fit, Fitted
+    from chuteflow.fitting.design import Design
     from chuteflow.fitting.direct import DirectMeasurement
     from chuteflow.fitting.prediction import Prediction
 
@@ -113,6 +114,23 @@ def prediction_object(found: Prediction) -> dict[str, Any]:
             {"kind": one.kind, "value": one.value, "relative_error": contract.finite(one.error)} for one in found.folds
         ],
         "warnings": found.warnings,
+    }
+
+
+def design_object(found: Design) -> dict[str, Any]:
+    """What ``chuteflow design --json`` prints."""
+    return {
+        "wanted": dict(found.wanted),
+        "solutions": [
+            {
+                "values": dict(zip((p.key for p in found.unknown), one.values.tolist(), strict=True)),
+                "chute": contract.chute_object(one.flow.chute),
+                "flow": contract.flow_object(one.flow),
+            }
+            for one in found.solutions
+        ],
+        "starts": found.starts,
+        "reason": found.reason,
     }
 
 

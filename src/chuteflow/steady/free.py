@@ -7,7 +7,7 @@ They are called by the keys of :data:`chuteflow.parameters.BY_KEY`, such as ``ew
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -125,6 +125,30 @@ def free_parameter(chute: Chute, asked: str) -> FreeParameter:
     if found:
         raise InputError(f"parameter {shown(asked)}: it is {' or '.join(found)}; say which")
     raise InputError(f"unknown parameter {shown(asked)}: choose from {', '.join(known)}")
+
+
+def chosen_parameters(
+    chute: Chute, free: Sequence[str], ranges: Mapping[str, tuple[float, float]]
+) -> tuple[FreeParameter, ...]:
+    """The parameters of ``chute`` called ``free``, to be looked for in the ``ranges`` that are given by name.
+
+    Raises:
+        InputError: for an unknown name, one that is there twice, or a range that is not allowed.
+    """
+    found = tuple(free_parameter(chute, name) for name in free)
+    keys = [parameter.key for parameter in found]
+    if len(set(keys)) < len(keys):
+        raise InputError(f"free parameters {', '.join(keys)}: each once")
+    asked = {free_parameter(chute, name).key: pair for name, pair in ranges.items()}
+    for key, (low, high) in asked.items():
+        if key not in keys:
+            raise InputError(f"a range of {key} is given, which is not free")
+        parameter = found[keys.index(key)]
+        if not parameter.low <= low < high <= parameter.high:
+            raise InputError(
+                f"range {low:g} to {high:g} of {key}: must rise, and be within {parameter.low:g} to {parameter.high:g}"
+            )
+    return tuple(replace(p, likely=asked[p.key]) if p.key in asked else p for p in found)
 
 
 def _free(chute: Chute, key: str) -> FreeParameter:

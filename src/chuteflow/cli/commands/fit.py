@@ -69,7 +69,8 @@ def command(**given: Any) -> None:
     options.require_outputs({"save": None, "plot": given["direct"]})
     free = _names(given["free"])
     closures = _closures(given)
-    chute = _chute(given, free, closures[0])
+    # The slope may come with the file.
+    chute = chute_with(given, [*free, "slope"], closure=closures[0], settings=())
     scales = options.scales(given)
     from chuteflow.fitting.comparison import compare
     from chuteflow.io import contract
@@ -126,14 +127,18 @@ def _closures(given: Mapping[str, Any]) -> list[str]:
     return [text] if "=" in text else [name.strip() for name in text.split(",") if name.strip()]
 
 
-def _chute(given: Mapping[str, Any], free: list[str], closure: str) -> Chute:
-    """The chute of the options; what is free, or may come with the file, need not be given."""
-    filled = dict(given) | {"closure": closure, "settings": ()}
+def chute_with(given: Mapping[str, Any], free: list[str], **changes: Any) -> Chute:
+    """The chute of the options with ``changes`` of them; what is ``free`` need not be given.
+
+    Raises:
+        InputError: as :func:`chuteflow.cli.options.chute`.
+    """
+    filled = dict(given) | changes
     names = {parameter.name: key for key, parameter in BY_KEY.items()}
     asked = {names.get(name, name) for name in free}
     for key, value in _FIRST.items():
         unknown = given[key] is None and (key != "slope" or given["angle"] is None)
-        if unknown and (key in asked or key == "slope" or (key == "roughness" and _without_roughness(given))):
+        if unknown and (key in asked or (key == "roughness" and _without_roughness(given))):
             filled[key] = value
     return options.chute(filled)
 
