@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow import display
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.fitting.direct import DirectMeasurement, direct
 from chuteflow.fitting.identifiability import trade_offs
@@ -38,6 +38,8 @@ _LENIENT, _TIGHT, _FLAT = 0.01, 0.002, 0.15
 _HOPELESS = 30.0
 #: Confidence of intervals unless another is asked for.
 CONFIDENCE = 0.95
+#: Trial chutes at most.
+_MOST_TRIALS = 100_000
 #: Rounds in which intervals come upon a better fit.
 _ROUNDS = 4
 #: Parameters of two fits that differ by less, in their errors, are the same; flows by less in ln Q, h, M and T.
@@ -279,6 +281,7 @@ def fit(
     if loss not in LOSSES:
         raise InputError(f"loss {shown(loss)}: choose one of {', '.join(LOSSES)}")
     confidence = number("confidence", confidence, 0.5, 0.9999)
+    trials = None if trials is None else whole("trials", trials, 1, _MOST_TRIALS)
     parameters = chosen_parameters(chute, free, ranges or {})
     if measured.in_units and any(parameter.key == "slope" for parameter in parameters):
         raise InputError("the slope is free, and makes the measurements dimensionless: give them without units")

@@ -240,7 +240,7 @@ class Place:
     @cached_property
     def answer(self) -> Sensitivity:
         """Its derivatives."""
-        return sensitivity(self.flow, [parameter.key for parameter in self.free])
+        return sensitivity(self.flow, self.free)
 
     def held(self, along: Array, across: Array) -> tuple[Array, Array]:
         """Derivatives with respect to the parameters (k, m) at a fixed label, and to the label (m,), of what changes

@@ -26,6 +26,10 @@ _RANGES = {
     "base.packing": ((0.3, 1.0), (0.5, 0.74)),
 }
 _LIKELY = {"slope": (0.1, 0.7), "e": (0.6, 0.98), "ew": (0.3, 0.98), "roughness": (0.5, math.sqrt(3.0) / 2.0)}
+#: A packing that every law takes that takes another than its own.
+_ANY_PACKING = 0.64
+#: Above what a packing has to be, by so much.
+_ABOVE = 1e-6
 _LATEX = {
     "closure.packing": r"\nu^*",
     "closure.friction": r"\mu",
@@ -156,7 +160,8 @@ def _free(chute: Chute, key: str) -> FreeParameter:
         return FreeParameter(key, BY_KEY[key].low, BY_KEY[key].high, _LIKELY[key])
     if key == "closure.packing":
         (low, high), likely = _RANGES[key]
-        low = max((low, *chute.law.breaks_at(chute.restitution, chute.slope)))
+        # A radial function that begins at a density needs a packing above it.
+        low = max((low, *chute.law.breaks_at(chute.restitution, chute.slope))) + _ABOVE
         return FreeParameter(key, low, high, (max(likely[0], low), likely[1]))
     bounds, likely = _RANGES.get(key, ((-math.inf, math.inf), (math.nan, math.nan)))
     if key not in _RANGES:
@@ -173,7 +178,7 @@ def _can_vary(chute: Chute, name: str) -> bool:
     if name != "packing":
         return isinstance(value, float)
     try:
-        chute.law.configured(packing=0.999 * chute.law.densest)
+        chute.law.configured(packing=_ANY_PACKING)
     except InputError:
         return False
     return True

@@ -40,6 +40,8 @@ from chuteflow.threads import on_one_thread
 
 #: A quantity turns where its logarithm changes by less than this per arclength of the branch.
 _TURNS = 1e-6
+#: The place of the largest density is found by secants, the first one to a place so far aside.
+_SECANTS, _ASIDE = 3, 1e-3
 #: Positions of the conditions in m.
 WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 #: What profiles are differentiated at: a fixed height above the base, or a fixed share of the mass above.
@@ -71,7 +73,7 @@ class _Moved(Flow):
         """Derivatives of the numbers of the registry."""
         flow = start.flow
         log_q, log_h, log_m, log_t = self.place.tolist()
-        largest = float(derivative(self._at_share(flow._share_of_largest)[0]["nu"][0]))
+        largest = float(derivative(self._at_share(start.densest)[0]["nu"][0]))
         depth, above = self._depth(start, largest / flow.largest_volume_fraction)
         found = {
             "mass_flux": flow.mass_flux * log_q,
@@ -123,6 +125,30 @@ class _Start:
     def above(self) -> float:
         """Share of the mass above the depth."""
         return self.flow._share_above_depth
+
+    @cached_property
+    def densest(self) -> Array:
+        """Share of the mass above the largest volume fraction (1,), to all digits.
+
+        The density is flat there, and what it answers to a parameter is not.
+        """
+        share = self.flow._share_of_largest
+        if not 0.0 < share[0] < 1.0:
+            return share
+        places = [float(share[0]) * (1.0 - _ASIDE), float(share[0])]
+        values = [self._rise(place) for place in places]
+        for _ in range(_SECANTS):
+            if values[1] == values[0]:
+                break
+            place = places[1] - values[1] * (places[1] - places[0]) / (values[1] - values[0])
+            if not 0.0 < place < 1.0:
+                return share
+            places, values = [places[1], place], [values[1], self._rise(place)]
+        return np.array([places[1]])
+
+    def _rise(self, place: float) -> float:
+        """d ln nu/d ln p but for its sign and a positive factor."""
+        return float(self.flow._at_share(np.array([place]))[0]["rise"][0]) - 1.0
 
     def fields(self, share: Array) -> dict[str, Array]:
         """All fields at shares (m,)."""
@@ -313,7 +339,7 @@ def slopes_in_height(flow: Flow, z: Array) -> dict[str, Array]:
 
 
 @on_one_thread
-def sensitivity(flow: Flow, parameters: Sequence[str] | None = None, *, at: str = "Q") -> Sensitivity:
+def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = None, *, at: str = "Q") -> Sensitivity:
     """Exact derivatives of ``flow`` with respect to ``parameters`` of its chute, all that can be varied by default.
 
     Args:
@@ -325,7 +351,8 @@ def sensitivity(flow: Flow, parameters: Sequence[str] | None = None, *, at: str 
         InputError: for an unknown name, or a flow whose law is not registered.
     """
     chute = flow.chute
-    free = all_free(chute) if parameters is None else tuple(free_parameter(chute, name) for name in parameters)
+    asked = all_free(chute) if parameters is None else parameters
+    free = tuple(one if isinstance(one, FreeParameter) else free_parameter(chute, one) for one in asked)
     condition = _condition(at)
     problem, z, state = flow.solution.problem, flow.solution.z, flow.solution.state
     jacobian, gradient = state.jacobian(), state.macroscopic_gradient()

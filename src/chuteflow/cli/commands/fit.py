@@ -57,6 +57,7 @@ class Range(click.ParamType):
 @click.option("--trust", type=Range(), multiple=True, help="Use values of z, nu, T or u in this range alone.")
 @options.option("--loss", metavar="NAME", help="linear (the default), or soft_l1, huber, cauchy for outliers.")
 @options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
+@options.option("--trials", type=click.INT, help="Trial chutes that the search starts from; 64 for one experiment.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @options.option("--plot", metavar="FILE", help="Draw measurements, fit and residuals into FILE: .png, .pdf or .svg.")
 @options.option(
@@ -82,7 +83,7 @@ def command(**given: Any) -> None:
     if slope is None and "slope" not in free and any("slope" not in one.given for one in measured.experiments):
         raise InputError("missing --slope or --angle, or a column of the file: what is the slope of the chute?")
     settings: dict[str, Any] = {"base_height": given["base_height"], "ranges": dict(given["ranges"])}
-    settings |= {name: given[name] for name in ("loss", "confidence") if given[name] is not None}
+    settings |= {name: given[name] for name in ("loss", "confidence", "trials") if given[name] is not None}
     found = compare(measured, chute, free, closures, **settings)
     if given["as_json"]:
         answer = contract.text(comparison_object(found.fits, found.failed))
