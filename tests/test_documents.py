@@ -82,6 +82,8 @@ def names_in(value):
         pytest.param("growth {chute} --flux 3 --kx 0:0.02 --ky 0:0.02 --size 4x4", marks=pytest.mark.slow),
         pytest.param("neutral {chute} --size 4x4 --search-temperature 1:10", marks=pytest.mark.slow),
         "relax {chute} --flux 3 --duration 1",
+        "sensitivities {chute} --flux 3 --flow 3",
+        pytest.param("design {chute} --unknown slope --flux 3 --holdup 1", marks=pytest.mark.slow),
     ],
     ids=lambda command: command.split()[0],
 )

@@ -11,7 +11,13 @@ if TYPE_CHECKING:
     from chuteflow.branches.enumeration import flows
     from chuteflow.branches.results import Branch, Curve, FlowSet, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
+    from chuteflow.fitting.calibration import Fit, fit
+    from chuteflow.fitting.comparison import compare
+    from chuteflow.fitting.design import design
+    from chuteflow.fitting.measurements import Measurements, measurements, together
+    from chuteflow.fitting.prediction import predict
     from chuteflow.io.files import load, save
+    from chuteflow.io.measurements_file import read_measurements
     from chuteflow.maps.domain import Domain, domain
     from chuteflow.stability.verdict import Stability, stability_of
     from chuteflow.steady.chute import Chute
@@ -43,7 +49,16 @@ _HOMES = {
     "Turning": "bifurcations.boundary",
     "boundary": "bifurcations.boundary",
     "Stability": "stability.verdict",
+    "Fit": "fitting.calibration",
     "HotModel": "steady.hot",
+    "Measurements": "fitting.measurements",
+    "compare": "fitting.comparison",
+    "design": "fitting.design",
+    "fit": "fitting.calibration",
+    "measurements": "fitting.measurements",
+    "predict": "fitting.prediction",
+    "read_measurements": "io.measurements_file",
+    "together": "fitting.measurements",
     "curve": "branches.curve",
     "domain": "maps.domain",
     "flows": "branches.enumeration",
@@ -62,10 +77,12 @@ __all__ = [
     "ChuteflowError",
     "Curve",
     "Domain",
+    "Fit",
     "Flow",
     "FlowSet",
     "HotModel",
     "InputError",
+    "Measurements",
     "Profile",
     "Quantity",
     "Scales",
@@ -76,13 +93,20 @@ __all__ = [
     "Turning",
     "__version__",
     "boundary",
+    "compare",
     "curve",
+    "design",
     "domain",
+    "fit",
     "flows",
     "hot",
     "load",
+    "measurements",
+    "predict",
+    "read_measurements",
     "save",
     "stability_of",
+    "together",
 ]
 
 

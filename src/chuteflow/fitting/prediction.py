@@ -22,14 +22,13 @@ from chuteflow.branches.results import Curve, FlowSet
 from chuteflow.checks import number
 from chuteflow.fitting.calibration import CONFIDENCE, Calibration
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.parameters import CONDITIONS
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import FIELDS
 from chuteflow.steady.sensitivity import Sensitivity, sensitivity
 
-#: What turns at each kind of fold.
-_TURNING = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
+#: What turns at each kind of fold, and what it is called.
+_TURNING = {"fold-Q": (LOG_Q, "Q"), "fold-M": (LOG_M, "M"), "fold-T": (LOG_T, "T_surface")}
 #: Heights of profiles.
 _HEIGHTS = 121
 #: Points of a branch that a band is drawn through, about.
@@ -71,7 +70,12 @@ class PredictedFold:
     @property
     def value(self) -> float:
         """Q, M or T_surface at the fold."""
-        return float(np.exp(self.flow.solution.macroscopic[_TURNING[self.kind]]))
+        return float(np.exp(self.flow.solution.macroscopic[_TURNING[self.kind][0]]))
+
+    @property
+    def turns(self) -> str:
+        """What turns there: Q, M or T_surface."""
+        return _TURNING[self.kind][1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +118,7 @@ class Prediction:
         for branch in self.curve.branches:
             for point in branch.special:
                 if point.kind in _TURNING:
-                    across = sensitivity(point.flow, self.calibration.keys).across[_TURNING[point.kind]]
+                    across = sensitivity(point.flow, self.calibration.keys).across[_TURNING[point.kind][0]]
                     found.append(PredictedFold(point.kind, point.flow, _error(across, self.calibration.covariance)))
         return tuple(found)
 
@@ -127,7 +131,7 @@ class Prediction:
         ]
         key, value = self.asked
         for fold in self.folds:
-            if NUMBERS[CONDITIONS[key].quantity].symbol == fold.kind.removeprefix("fold-"):
+            if key == fold.turns:
                 off = abs(float(np.log(fold.value / value)))
                 if off < self.widths * fold.error:
                     said.append(

@@ -97,6 +97,5 @@ def _report(found: Prediction) -> Iterator[str]:
         yield f"no flow: {found.flow_set.reason}"
     yield ""
     for fold in found.folds:
-        name = fold.kind.removeprefix("fold-")
-        yield f"{fold.kind}: {name} = {tables.number(fold.value)} +- {fold.value * found.widths * fold.error:.2g}"
+        yield f"{fold.kind}: {fold.turns} = {tables.number(fold.value)} +- {fold.value * found.widths * fold.error:.2g}"
     yield from found.warnings
