@@ -56,7 +56,7 @@ def test_no_example_is_passed_over(page):
 
 def documented_names():
     text = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
-    return set(re.findall(r"`([\w-]+)`", text))
+    return set(re.findall(r"`([\w.-]+)`", text))
 
 
 def names_in(value):

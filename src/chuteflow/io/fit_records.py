@@ -94,7 +94,7 @@ def prediction_object(found: Prediction) -> dict[str, Any]:
                 "profiles": {
                     "z": one.height.tolist(),
                     **{
-                        FIELDS[name].symbol: {"value": _numbers(pair[0]), "error": _numbers(pair[1])}
+                        name: {"value": _numbers(pair[0]), "error": _numbers(pair[1])}
                         for name, pair in one.profiles.items()
                     },
                 },

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.io import contract
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import NUMBERS
 
 if TYPE_CHECKING:
     from chuteflow.numerics.chebyshev import Array
@@ -27,14 +27,16 @@ def sensitivity_object(found: Sensitivity, heights: Array | None = None) -> dict
         "logarithmic": {NUMBERS[name].symbol: _by_key(found, values) for name, values in found.logarithmic.items()},
         "along_branch": {NUMBERS[name].symbol: contract.finite(value) for name, value in along.items()},
         "across_branch": {NUMBERS[name].symbol: _by_key(found, values) for name, values in across.items()},
-        "paths": {key: found.path(key) for key in found.keys},
+        "paths": {
+            key: {name.removeprefix("ln "): value for name, value in found.path(key).items()} for key in found.keys
+        },
     }
     if heights is not None:
         profiles = found.profile(heights)
         answer["profiles"] = {
             "z": heights.tolist(),
             **{
-                FIELDS[name].symbol: {
+                name: {
                     key: [contract.finite(value) for value in row] for key, row in zip(found.keys, rows, strict=True)
                 }
                 for name, rows in profiles.items()
