@@ -26,6 +26,7 @@ def blas_threads():
     return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
 
 
+@pytest.mark.slow
 def test_the_command_line_has_the_same_bits_with_any_setting():
     options = [part for pair in zip(("--slope", "--e", "--ew", "--roughness"), DEEP, strict=True) for part in pair]
     arguments = ["-m", "chuteflow", "curve", *options, "--surface", "interface", "--points", "20", "--json"]

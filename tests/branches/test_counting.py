@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from chuteflow import Chute, curve, flows, load, save
 from chuteflow.branches.counting import flux_counts
-from chuteflow.branches.ranges import CLOSED, VANISHES
+from chuteflow.branches.ranges import BranchEnd
 from chuteflow.branches.results import FlowSet
 from chuteflow.cli.commands.curve import command as curve_command
 from chuteflow.cli.commands.solve import command as solve_command
@@ -51,7 +51,7 @@ def test_counts_hold_for_the_flows_of_one_flux():
 def test_a_branch_that_ends_for_good_leaves_nothing_open():
     found = curve(TUTORIAL, surface_temperature=RANGE, points=20)
     (branch,) = found.branches
-    ended = replace(found, branches=(replace(branch, ends=(CLOSED, VANISHES)),))
+    ended = replace(found, branches=(replace(branch, ends=(BranchEnd.CLOSED, BranchEnd.VANISHES)),))
     assert not any(count.at_least for count in flux_counts(ended))
     assert words.multiplicity(ended, None).endswith("2 for Q from 19.146 to 27.844")
 

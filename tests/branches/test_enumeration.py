@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, curve, flows
+from chuteflow.branches.enumeration import flows_within
+from chuteflow.steady.collocation import LOG_Q
+from chuteflow.steady.solver import TOLERANCE
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 
@@ -73,7 +76,7 @@ def test_extreme_fluxes_extend_the_search():
     assert hot.surface_temperature / less.surface_temperature == pytest.approx(1e6, rel=1e-3)
 
 
-def test_deep_flows_beyond_the_dividing_trajectory():
+def test_deep_flows_beyond_the_separatrix():
     found = flows(Chute(0.29, 0.9, 0.8, 0.7), M=29.0)
     by_temperature = [f.surface_temperature for f in found]
     assert len(found) >= 3
@@ -209,3 +212,25 @@ def test_where_families_are_many_already_the_range_is_not_extended():
     assert time.process_time() - begin < 20.0
     assert [flow.mass_flux for flow in found] == pytest.approx([1e-6, 1e-6], rel=1e-10)
     assert found.searched.largest_holdup == 30.0
+
+
+@pytest.mark.parametrize(
+    ("chute", "flux"),
+    [
+        (PAPER, 3.0),
+        # Trajectories wind.
+        (Chute(0.36, 0.8, 0.8, 0.75), 20.0),
+        (Chute(0.38, 0.8, 0.8, 0.84), 2.0),
+        # The branch of the second flow enters the range of surface temperatures at a flux beyond the bound.
+        (Chute(0.391089189961052, 0.8156062013526888, 0.6924967997059326, 0.8477526561903331), 0.1407366280409692),
+    ],
+    ids=str,
+)
+def test_trajectories_need_not_be_followed_to_larger_fluxes(chute, flux):
+    every = flows(chute, Q=flux)
+    found = flows_within(chute, LOG_Q, flux, TOLERANCE, (1e-3, 1e5), 30.0, largest_flux=3.0 * flux)
+    assert len(found) == len(every) > 0
+    for one, other in zip(found, every, strict=True):
+        assert one.mass_holdup == pytest.approx(other.mass_holdup, rel=1e-9)
+    if every.searched.cells.number > 20_000:
+        assert found.searched.cells.number < every.searched.cells.number / 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, curve, domain, flows, hot
-from chuteflow.branches.counting import most_at_once
+from chuteflow.branches.counting import flux_counts, most_at_once
 from chuteflow.maps import CODES, exists_at
 from chuteflow.maps.columns import Part, alike
 from chuteflow.maps.kinds import _monotonic_pieces, kinds
@@ -259,9 +259,33 @@ def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
     log_q, rise = s**3 - 0.25 * s, 3.0 * s**2 - 0.25
     assert (np.diff(log_q) > 0.0).all()
     assert (rise > 0.0).all()
-    pieces = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
-    assert most_at_once(pieces) == 3
-    assert most_at_once(_monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)) == 1
+    every, _ = _monotonic_pieces(s, np.zeros_like(s), log_q, rise)
+    assert most_at_once(every) == 3
+    near = np.linspace(-1.2, 1.2, 40)
+    _, sure = _monotonic_pieces(near, np.zeros_like(near), near**3 - 0.25 * near, 3.0 * near**2 - 0.25)
+    assert most_at_once(sure) == 3
+    every, _ = _monotonic_pieces(s, np.zeros_like(s), s**3 + 0.25 * s, 3.0 * s**2 + 0.25)
+    assert most_at_once(every) == 1
+
+
+@pytest.mark.parametrize(
+    ("slope", "roughness", "most"),
+    [(0.38625, 0.57775, 2), (0.40375, 0.61475, 2), (0.358, 0.5275, 2), (0.36, 0.52825, 1), (0.385, 0.5735, 2)],
+)
+def test_scatter_of_deep_flows_makes_no_folds(slope, roughness, most):
+    # In each, ln Q of neighbouring flows on the grid differs from a smooth line by more than its change.
+    plane = Plane(Axis("slope", 0.25, 0.45), Axis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ())
+    found = code(plane, (slope - 0.25) / 0.2, (roughness - 0.5) / 0.36)
+    assert found[CODES.index("most")] == most
+    solved = curve(Chute(slope, 0.8, 0.8, roughness), points=10)
+    assert max(count.flows for count in flux_counts(solved)) == most
+
+
+def test_the_first_inverted_flow_is_where_the_density_at_its_base_first_rises():
+    plane = Plane(Axis("slope", 0.25, 0.45), Axis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ())
+    # By curves of 300 points it is at r = 0.76589.
+    mapped = [code(plane, 0.465, (r - 0.5) / 0.36)[CODES.index("inverted")] for r in (0.7654, 0.7664)]
+    assert mapped == [1, 0]
 
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():

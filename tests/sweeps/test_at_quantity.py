@@ -19,7 +19,7 @@ def swept(parameters, which, values):
     columns = np.array(parameters, dtype=float).reshape(-1, 4).T
     batch = Batch.of("lun", "free", *columns)
     found, unsettled = at_quantity(batch, which, np.array(values, dtype=float), (1e-3, 1e5), 30.0, 1e-10)
-    return np.bincount(found.lane, minlength=len(batch)), unsettled, found
+    return np.bincount(found.member, minlength=len(batch)), unsettled, found
 
 
 @pytest.mark.parametrize(("parameters", "height"), PAIRS)
@@ -56,7 +56,7 @@ def test_near_folds_settled_lanes_have_the_flows_of_the_search_by_families():
             parameters.append((chute.slope, chute.restitution, chute.wall_restitution, chute.roughness))
             fluxes.append(fold.mass_flux * (1.0 + random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-4.0, -2.0)))
     _, unsettled, found = swept(parameters, LOG_Q, fluxes)
-    count = np.bincount(found.lane[found.macroscopic[LOG_M] < np.log(shallow)], minlength=len(fluxes))
+    count = np.bincount(found.member[found.macroscopic[LOG_M] < np.log(shallow)], minlength=len(fluxes))
     assert unsettled.mean() < 0.5
     for i in np.flatnonzero(~unsettled).tolist():
         expected = [flow for flow in flows(Chute(*parameters[i]), Q=fluxes[i]) if flow.mass_holdup < shallow]

@@ -255,7 +255,7 @@ def test_a_chute_that_cannot_be_solved_at_all_is_told(monkeypatch):
         raise SolveError("given up on purpose")
 
     monkeypatch.setattr(engine, "at_temperature", broken_at(0.31))
-    monkeypatch.setattr(engine, "search", given_up)
+    monkeypatch.setattr(engine, "flows_within", given_up)
     chunk = solve_chunk(slopes_study(), 0)
     assert chunk.status.tolist() == [0, 0, 0, Status.FAILED, 0]
     assert chunk.reason[3] == Reason.NO_ANSWER

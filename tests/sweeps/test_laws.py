@@ -110,6 +110,18 @@ def test_why_there_is_no_flow_is_not_said_by_a_hot_limit_that_is_none(path):
     assert solved.reason[1] == Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
 
 
+def test_columns_are_not_trusted_where_they_lose_flows_of_moderate_depth():
+    parameters = {
+        "slope": 0.3151755787861835,
+        "e": 0.8664500970114325,
+        "ew": 0.6794127150808549,
+        "roughness": 0.8285609810188521,
+        "M": 4.79322153646058,
+    }
+    solved = solve_chunk(from_dict({"design": {"kind": "list"}, "parameters": parameters}, Path()), 0)
+    assert solved.n_flows.tolist() == [2]
+
+
 def test_a_chunk_all_of_whose_points_wind_is_solved():
     study = from_dict(
         {"parameters": {"slope": [0.42], "e": 0.8, "ew": 0.8, "roughness": 0.6, "Q": 3.0}, "design": {"kind": "list"}},

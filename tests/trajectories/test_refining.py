@@ -57,7 +57,9 @@ def base_flux(problem, big_l):
     return problem.base_flux(f)
 
 
-@pytest.mark.parametrize("chute", [PAPER, *WINDING], ids=str)
+@pytest.mark.parametrize(
+    "chute", [PAPER, WINDING[0], *(pytest.param(one, marks=pytest.mark.slow) for one in WINDING[1:])], ids=str
+)
 def test_no_trajectory_leaves_a_region(chute):
     problem = model(chute)
     bounds, scale = tables(problem).bounds, problem.flux_scale

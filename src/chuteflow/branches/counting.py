@@ -8,10 +8,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from chuteflow.branches.families import trace_all
 from chuteflow.branches.lines import SteadyBranch
-from chuteflow.branches.ranges import goes_on
+from chuteflow.branches.ranges import BranchEnd, Range
 from chuteflow.branches.results import Branch, Curve
+from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.collocation import LOG_Q
+from chuteflow.steady.model import Model
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,24 @@ def most_at_once(stretches: Array, apart: float = 0.0) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
+def most_solved(problem: Model, within: Range, tolerance: float) -> int | None:
+    """The largest number of flows in a range that share one mass flux, by branches solved from end to end; None where
+    one of them could not be followed."""
+    try:
+        families, lost = trace_all(problem, within, tolerance)
+        stops = [
+            [family.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), family.macroscopic[-1, LOG_Q]]
+            for family in families
+            for turning in [family.turns(LOG_Q, tolerance)]
+        ]
+    except SolveError:
+        return None
+    if lost or any(BranchEnd.LOST in family.ends for family in families):
+        return None
+    stretches = [sorted(pair) for along in stops for pair in pairwise(along)]
+    return most_at_once(np.array(stretches)) if stretches else 0
+
+
 def _monotonic(branch: SteadyBranch) -> list[tuple[float, float]]:
     """Lowest and highest mass flux of the stretches of a branch between its folds."""
     stops = _stops(branch)
@@ -67,7 +89,9 @@ def _beyond(branch: Branch) -> list[tuple[float, float]]:
     """Lowest and highest mass flux to which a branch may go on beyond its ends."""
     stops = _stops(branch)
     ends = ((stops[1], stops[0], branch.ends[0]), (stops[-2], stops[-1], branch.ends[1]))
-    return [(end, np.inf) if end > before else (0.0, end) for before, end, words in ends if goes_on(words)]
+    return [
+        (end, np.inf) if end > before else (0.0, end) for before, end, words in ends if not BranchEnd.of(words).is_final
+    ]
 
 
 def _stops(branch: SteadyBranch) -> list[float]:

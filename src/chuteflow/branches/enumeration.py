@@ -68,8 +68,23 @@ def flows(
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
     """
-    which, value = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    condition = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
+    return flows_within(chute, *condition, tolerance, surface_temperature, largest_holdup)
+
+
+@np.errstate(under="ignore")
+def flows_within(
+    chute: Chute,
+    which: int,
+    value: float,
+    tolerance: float,
+    surface_temperature: tuple[float, float],
+    largest_holdup: float,
+    largest_flux: float = np.inf,
+) -> FlowSet:
+    """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`; those with a mass flux above
+    ``largest_flux`` need not be among them."""
+    within = replace(Range.checked(surface_temperature, largest_holdup, chute.surface), largest_flux=largest_flux)
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
         # Well inside, so that a turn near the value is seen from both sides.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.paths import Chord, Point, Turn, find_value, point_at, refined, turns
-from chuteflow.branches.ranges import CLOSED, Range
+from chuteflow.branches.ranges import BranchEnd, Range
 from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -59,8 +59,6 @@ _AT_EDGE = 1e-6
 _HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
-#: Why a branch ends where it is lost.
-LOST = "it could not be followed further"
 #: Searches whose result is remembered.
 _REMEMBERED = 4
 
@@ -191,9 +189,9 @@ class Family:
                 pieces[-1] += refined([one, other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
-        ends = [LOST] * (2 * len(pieces))
+        ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
         if len(found) > 1 and len(pieces) == 1 and found[0] is found[-1]:
-            ends = [CLOSED, CLOSED]
+            ends = [BranchEnd.CLOSED, BranchEnd.CLOSED]
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
         return [
@@ -247,7 +245,7 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
 
 def search(model: Model, within: Range) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
-    return carry_down(model, within.coldest, within.hottest, within.deepest)
+    return carry_down(model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux)
 
 
 def searched(within: Range, grid: TrajectoryGrid) -> Searched:

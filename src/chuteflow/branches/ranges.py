@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -12,10 +13,30 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, SHALLOWEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
 
-#: Why a branch ends for good, in words.
-VANISHES, CLOSED = "its hold-up vanishes", "the branch closes on itself"
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
+
+
+class BranchEnd(StrEnum):
+    """Why a branch ends, in words; those that leave the range go on with the number at its edge."""
+
+    VANISHES = "its hold-up vanishes"
+    CLOSED = "the branch closes on itself"
+    DEEPER = "it goes on to hold-ups above"
+    HOTTER = "it goes on to surface temperatures above"
+    COLDER = "it goes on to surface temperatures below"
+    LOST = "it could not be followed further"
+    NOT_SEARCHED = "the search was not carried further"
+
+    @classmethod
+    def of(cls, words: str) -> BranchEnd:
+        """The kind of an end that is told in ``words``; NOT_SEARCHED for words of another method."""
+        return next((end for end in cls if words.startswith(end)), cls.NOT_SEARCHED)
+
+    @property
+    def is_final(self) -> bool:
+        """Whether there are no more flows beyond."""
+        return self in (BranchEnd.VANISHES, BranchEnd.CLOSED)
 
 
 @dataclass(frozen=True)
@@ -23,13 +44,15 @@ class Range:
     """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
 
     A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
-    proportion to their temperature, and no family ends so.
+    proportion to their temperature, and no family ends so. Mass fluxes above ``largest_flux`` are not asked for: a
+    branch may end on its way to them.
     """
 
     coldest: float
     hottest: float
     deepest: float
     shallowest: float
+    largest_flux: float = np.inf
 
     @classmethod
     def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
@@ -87,17 +110,12 @@ class Range:
         """Why a branch ends at a flow."""
         edge = self.at_edge(macroscopic, _NEAR)
         if edge is None:
-            return "the search was not carried further"
+            return BranchEnd.NOT_SEARCHED
         axis, value = edge
         if axis == LOG_M:
             if value == np.log(self.deepest):
-                return f"it goes on to hold-ups above {self.deepest:g}"
-            return VANISHES
+                return f"{BranchEnd.DEEPER} {self.deepest:g}"
+            return BranchEnd.VANISHES
         if value == np.log(self.hottest):
-            return f"it goes on to surface temperatures above {self.hottest:g}"
-        return f"it goes on to surface temperatures below {self.coldest:g}"
-
-
-def goes_on(words: str) -> bool:
-    """Whether a branch that ends with these words may have more flows beyond: it leaves the range, or is lost."""
-    return words not in (VANISHES, CLOSED)
+            return f"{BranchEnd.HOTTER} {self.hottest:g}"
+        return f"{BranchEnd.COLDER} {self.coldest:g}"

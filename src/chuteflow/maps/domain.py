@@ -1,7 +1,7 @@
 """Maps of the domains of existence: classes over two parameters, and the boundaries between them.
 
 The outer axis gets as many columns as the boundaries ask for (:mod:`chuteflow.maps.columns`), which are
-worked out side by side in processes; the grid of the map is read off them.
+worked out in parallel processes; the grid of the map is read off them.
 """
 
 from __future__ import annotations

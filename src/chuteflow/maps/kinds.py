@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.counting import most_at_once
 from chuteflow.branches.rough_turns import dips
-from chuteflow.maps.zeros import Index, Zeros, lagrange, thinned, zeros_on
+from chuteflow.maps.zeros import Index, Zeros, lagrange, zeros_on
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import TrajectoryGrid
@@ -30,8 +30,9 @@ _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 class Kinds:
     """The flows of one chute in the range searched.
 
-    ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux;
-    ``families`` the number of families (connected sets of flows); ``interior`` and ``density`` the bits of
+    ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
+    ``doubtful`` tells whether it would be larger with turns of the flux that are smaller than its uncertainty;
+    ``families`` is the number of families (connected sets of flows); ``interior`` and ``density`` have the bits of
     INTERIORS and DENSITIES that are present.
     """
 
@@ -40,6 +41,7 @@ class Kinds:
     families: int
     interior: int
     density: int
+    doubtful: bool
 
 
 def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> Kinds:
@@ -47,21 +49,21 @@ def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) 
     of :func:`chuteflow.maps.zeros.extremes_on`."""
     lines = [line for line, _ in grid.lines if len(line) > 1]
     if not lines:
-        return Kinds((False,) * len(temperatures), 0, 0, 0, 0)
+        return Kinds((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
     zeros = zeros_on(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
     pieces, interior, density = [], 0, 0
     for line in lines:
         hotter = zeros.log_t[line, None] >= np.log(temperatures)
         at |= hotter.any(axis=0) & ~hotter.all(axis=0)
-        kept = line[thinned(np.stack([zeros.log_q[line], zeros.log_m[line], zeros.log_t[line]], axis=1))]
+        kept = zeros.along(line)
         pieces.append(_monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept]))
         found = _present(zeros, kept)
         interior |= sum(bit for bit, there in zip(INTERIORS.values(), found[:3], strict=True) if there)
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
-    return Kinds(
-        tuple(map(bool, at.tolist())), most_at_once(np.concatenate(pieces), _TURN), len(lines), interior, density
-    )
+    most, least = (most_at_once(np.concatenate(stretches), _TURN) for stretches in zip(*pieces, strict=True))
+    there = tuple(map(bool, at.tolist()))
+    return Kinds(there, least, len(lines), interior, density, doubtful=most != least)
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:
@@ -99,26 +101,45 @@ def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
     ]
 
 
-def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> Array:
+def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> tuple[Array, Array]:
     """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q, where ``rise`` changes
-    sign."""
+    sign: of all turns, and of those alone that are larger than ln Q is uncertain."""
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
     log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
     before, share = _changes(rise, at)
-    stops = log_q[[0, -1]]
-    if before.size:
-        turns = at[before] + (at[before + 1] - at[before]) * share
-        if len(at) > 3:
-            around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
-            turned = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
-        else:
-            turned = np.interp(turns, at, log_q)
-        along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
-        first = along if rise[0] > 0.0 else -along
-        stops = np.array(_confirmed([log_q[0], *turned, log_q[-1]], first))
-    ends = np.stack([stops[:-1], stops[1:]], axis=1)
-    return np.sort(ends, axis=1)
+    if not before.size:
+        whole = np.sort(log_q[[0, -1]])[None]
+        return whole, whole
+    turns = at[before] + (at[before + 1] - at[before]) * share
+    turned = np.interp(turns, at, log_q)
+    if len(at) > 3:
+        around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
+        cubic = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
+        # Through uneven places a cubic may overshoot: beyond the step by no more than the steps around.
+        reach = np.abs(np.diff(log_q[around], axis=0)).max(axis=0)
+        turned = np.clip(cubic, turned - reach, turned + reach)
+    along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
+    first = along if rise[0] > 0.0 else -along
+    stops = [log_q[0], *turned, log_q[-1]]
+    scatter = _scatter(log_q, at)
+    noise = [0.0, *np.maximum(scatter[before], scatter[before + 1]), 0.0]
+    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, noise))
+
+
+def _stretches(stops: list[float]) -> Array:
+    return np.sort(np.stack([stops[:-1], stops[1:]], axis=1), axis=1)
+
+
+def _scatter(log_q: Array, at: Array) -> Array:
+    """How far values (k,) lie beside the cubics through the two before and the two after, (k,); at the two places next
+    to each end as at the nearest other."""
+    if len(at) < 5:
+        return np.zeros(len(at))
+    middle = np.arange(2, len(at) - 2)
+    around = middle + np.array([-2, -1, 1, 2])[:, None]
+    beside = np.abs((lagrange(at[around], at[middle]) * log_q[around]).sum(axis=0) - log_q[middle])
+    return np.pad(beside, 2, mode="edge")
 
 
 def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
@@ -134,25 +155,27 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     return steps[order], shares[order]
 
 
-def _confirmed(stops: list[float], rises: float) -> list[float]:
-    """Values at the ends and turns of a family without those turns between which it does not turn.
+def _confirmed(stops: list[float], rises: float, noise: list[float]) -> list[float]:
+    """Values at the ends and turns of a family without those turns between which it does not turn by more than the
+    ``noise`` of either.
 
     It ``rises`` first (1), or falls (-1), and so on in turn.
     """
-    stops = list(stops)
+    known = list(zip(stops, noise, strict=True))
     i = 0
-    while len(stops) > 2 and i < len(stops) - 1:
-        if (stops[i + 1] - stops[i]) * rises * (-1.0) ** i > _TURN:
+    while len(known) > 2 and i < len(known) - 1:
+        (one, doubt), (other, further) = known[i : i + 2]
+        if (other - one) * rises * (-1.0) ** i > max(_TURN, doubt, further):
             i += 1
         elif i == 0:
-            del stops[1]
+            del known[1]
             rises = -rises
-        elif i == len(stops) - 2:
-            del stops[i]
+        elif i == len(known) - 2:
+            del known[i]
         else:
-            del stops[i : i + 2]
+            del known[i : i + 2]
             i -= 1
-    return stops
+    return [value for value, _ in known]
 
 
 def _peak(values: Array) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from chuteflow.branches.counting import most_solved
 from chuteflow.branches.ranges import Range
 from chuteflow.checks import number
 from chuteflow.errors import InputError
@@ -38,6 +39,8 @@ SUMMARY = ("hot", "most", "families", "interior", "density")
 HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
 #: Bases along an axis, which bound those that a grid has to serve.
 _BETWEEN = 9
+#: To which branches are solved where a grid leaves the number of flows in doubt.
+_TOLERANCE = 1e-8
 #: Surface temperatures whose logarithms are nearer are one.
 _SAME = 1e-6
 
@@ -144,7 +147,12 @@ def summary(plane: Plane, outer: float, inner: float) -> Code:
 
 def _kinds(plane: Plane, chute: Chute) -> Kinds:
     grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
-    return kinds(grid.of_base(model(chute)), extremes, plane.temperatures)
+    problem = model(chute)
+    found = kinds(grid.of_base(problem), extremes, plane.temperatures)
+    if not found.doubtful:
+        return found
+    most = most_solved(problem, plane.within, _TOLERANCE)
+    return found if most is None else replace(found, most=most, doubtful=False)
 
 
 def hot_code(plane: Plane, outer: float, inner: float) -> Code:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.roots import false_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, LOSS, WORK
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.kernel import DILUTE, DILUTE_WEIGHT, S_G, S_L, S_T, S_Y
@@ -39,7 +40,9 @@ _TOLD = 1e-7
 class Zeros:
     """The zeros of B on a grid, (Z,) each: ln Q, ln M, ln T_surface; ``rise``, the derivative of ln Q along the zeros
     to a factor of one sign on each branch; ``extremes`` (Z, 6) lower and upper bounds of the least and the largest net
-    loss and the largest 1 - p dL/dp, and how far these are in ``doubt`` (Z, 3) for their place between states."""
+    loss and the largest 1 - p dL/dp, and how far these are in ``doubt`` (Z, 3) for their place between states. Those
+    that are ``scattered`` (Z,) lie between two trajectories whose surface temperatures are too near to tell them apart:
+    their ln Q is known to 1e-2 alone."""
 
     grid: TrajectoryGrid
     log_q: Array
@@ -48,6 +51,16 @@ class Zeros:
     rise: Array
     extremes: Array
     doubt: Array
+    scattered: NDArray[np.bool_]
+
+    def along(self, line: Index) -> Index:
+        """The zeros of a line that tell how quantities go along it: without the scattered ones that are between two
+        others, and without those that lie much nearer to each other than others around."""
+        out = self.scattered[line]
+        out[[0, -1]] = False
+        out[1:-1] &= ~out[:-2] & ~out[2:]
+        line = line[~out]
+        return line[_thinned(np.stack([self.log_q[line], self.log_m[line], self.log_t[line]], axis=1))]
 
     def traced(self, which: Index) -> Array:
         """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
@@ -82,15 +95,20 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     place = share.copy()
     down = ~across
     one_down, two_down, apart = one[down], two[down], step[down]
+    ends_down = known.excess[one_down], known.excess[two_down]
     slopes = known.excess_down[one_down] * apart, known.excess_down[two_down] * apart
-    place[down] = _hermite_zero(known.excess[one_down], known.excess[two_down], *slopes, share[down])
-    log_q = _hermite(
-        known.log_q[one], known.log_q[two], known.flux_down[one] * step, known.flux_down[two] * step, place
-    )
+    place[down] = false_position(lambda t: _hermite(*ends_down, *slopes, t), share[down])
+
+    def between(of: Array, down: Array) -> Array:
+        return _hermite(of[one], of[two], down[one] * step, down[two] * step, place)
+
+    log_q = between(known.log_q, known.flux_down)
+    big_l, y = between(known.big_l, known.l_down), between(known.y, known.y_down)
     log_m = known.log_m[one] + place * step
     log_t = grid.states[ends[:, 0], S_T].copy()
     # Through four neighbours at one depth.
-    log_q[across], log_t[across], place[across] = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
+    place[across], found = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
+    log_q[across], log_t[across], big_l[across], y[across] = found
 
     excess_down, excess_across, flux_down, flux_across = (
         of[one] + share * (of[two] - of[one])
@@ -98,17 +116,37 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     )
     size = np.abs(excess_down) + np.abs(excess_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
     rise = (flux_across * excess_down - flux_down * excess_across) / size
-    low, high = extremes[ends[:, 0]], extremes[ends[:, 1]]
-    return Zeros(grid, log_q, log_m, log_t, rise, low + place[:, None] * (high - low), 0.5 * np.abs(high - low)[:, :3])
+    # The extrema are those above, or those at the base.
+    low, high = extremes[ends[:, 0]], np.where(down[:, None], extremes[ends[:, 0]], extremes[ends[:, 1]])
+    bounds, doubt = low + place[:, None] * (high - low), 0.5 * np.abs(high - low)[:, :3]
+    net, curving = _at_base(grid, big_l, y, np.exp(log_m))
+    bounds[:, ::3] = np.minimum(bounds[:, ::3], net[:, None])
+    bounds[:, 1::3] = np.maximum(bounds[:, 1::3], net[:, None])
+    bounds[:, 2::3] = np.maximum(bounds[:, 2::3], curving[:, None])
+    scattered = across & (np.abs(grid.states[ends[:, 1], S_T] - grid.states[ends[:, 0], S_T]) < _TOLD)
+    return Zeros(grid, log_q, log_m, log_t, rise, bounds, doubt, scattered)
+
+
+def _at_base(grid: TrajectoryGrid, big_l: Array, y: Array, over: Array) -> tuple[Array, Array]:
+    """The net loss and 1 - p dL/dp at the base, (k,) each."""
+    model = grid.model
+    f, _ = model.closures(np.exp(big_l))
+    net = f[LOSS] - model.slope**2 * f[WORK]
+    return net, (over + model.surface_stress) * y / f[CONDUCTION] - model.beta
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is known at states (k,): ln M, B, ln Q, and their derivatives to ln P and from neighbour to neighbour."""
+    """What is known at states (k,): ln M, L, y, B, ln Q, and their derivatives to ln P and from neighbour to
+    neighbour."""
 
     log_m: Array
+    big_l: Array
+    y: Array
     excess: Array
     log_q: Array
+    l_down: Array
+    y_down: Array
     excess_down: Array
     flux_down: Array
     excess_across: Array
@@ -137,8 +175,12 @@ class _Known:
         l_across, y_across, glide_across = _across(grid, places, rows)
         return cls(
             np.log(over),
+            big_l,
+            y,
             y - base,
             np.log(flux),
+            l_down,
+            y_down,
             y_down - base_slope * l_down,
             share * (1.0 + 0.5 * dilation + by_l * l_down) + glide_down / flux,
             y_across - base_slope * l_across,
@@ -197,9 +239,9 @@ def _slope_weights(at: Array) -> Array:
     return out
 
 
-def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) -> tuple[Array, Array, Array]:
-    """ln Q, ln T_surface and the share of the way at zeros between states ``left`` and the next: of the cubic through
-    four neighbours where they are in one piece and even enough, else on the line."""
+def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) -> tuple[Array, Array]:
+    """The share of the way at zeros between states ``left`` and the next, and there ln Q, ln T_surface, L and y (4, k):
+    of the cubic through four neighbours where they are in one piece and even enough, else on the line."""
     around = left[:, None] + np.arange(-1, 3)
     low, high = grid.first[rows], grid.first[rows + 1] - 1
     inside = (around[:, 0] >= low) & (around[:, 3] <= high)
@@ -216,14 +258,16 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     even &= (gaps[:, [0, 2]] < _EVEN * gaps[:, 1:2]).all(axis=1) & (gaps[:, [0, 2]] * _EVEN > gaps[:, 1:2]).all(axis=1)
     if even.any():
         at = ((labels[even] - labels[even, 1:2]) / gaps[even, 1:2]).T
-        place = zero_of_cubic(at, excess[even].T, np.zeros(at.shape[1]), share[even])
+        values = excess[even].T
+        place = false_position(lambda x: (lagrange(at, x) * values).sum(axis=0), share[even])
         cubic = lagrange(at, place)
         sound = np.abs(cubic).sum(axis=0) < _SOUND
         even[even] = sound
         weights[even] = cubic[:, sound].T
         share = share.copy()
         share[even] = place[sound]
-    return (quantities[..., 0] * weights).sum(axis=1), (quantities[..., 3] * weights).sum(axis=1), share
+    of = np.stack([quantities[..., 0], quantities[..., 3], state[..., S_L], state[..., S_Y]])
+    return share, (of * weights).sum(axis=-1)
 
 
 def lagrange(at: Array, x: Array) -> Array:
@@ -237,43 +281,13 @@ def lagrange(at: Array, x: Array) -> Array:
     return weights
 
 
-def zero_of_cubic(at: Array, values: Array, low: Array, x: Array) -> Array:
-    """Where between ``low`` and ``low`` + 1 the cubic through ``values`` (4, n) at ``at`` vanishes.
-
-    By regula falsi from ``x``; a cubic without change of sign there leaves it at an end.
-    """
-    high = low + 1.0
-    f_low, f_high = ((lagrange(at, end) * values).sum(axis=0) for end in (low, high))
-    for _ in range(3):
-        f = (lagrange(at, x) * values).sum(axis=0)
-        left = (f > 0.0) == (f_low > 0.0)
-        low, f_low = np.where(left, x, low), np.where(left, f, f_low)
-        high, f_high = np.where(left, high, x), np.where(left, f_high, f)
-        span = f_high - f_low
-        x = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
-    return x
-
-
 def _hermite(one: Array, two: Array, slope_one: Array, slope_two: Array, t: Array) -> Array:
     rise = two - one
     return one + t * rise + t * (1.0 - t) * ((1.0 - t) * (slope_one - rise) - t * (slope_two - rise))
 
 
-def _hermite_zero(one: Array, two: Array, slope_one: Array, slope_two: Array, t: Array) -> Array:
-    """Where the cubic vanishes between its ends, by regula falsi."""
-    low, high, f_low, f_high = np.zeros_like(t), np.ones_like(t), one, two
-    for _ in range(3):
-        f = _hermite(one, two, slope_one, slope_two, t)
-        left = (f > 0.0) == (one > 0.0)
-        low, f_low = np.where(left, t, low), np.where(left, f, f_low)
-        high, f_high = np.where(left, high, t), np.where(left, f_high, f)
-        span = f_high - f_low
-        t = low - f_low * (high - low) / np.where(span != 0.0, span, 1.0)
-    return np.clip(t, 0.0, 1.0)
-
-
 @compiled
-def thinned(places: Array) -> Any:
+def _thinned(places: Array) -> Any:
     """Which of successive ``places`` (k, 3) to keep, of those that lie much nearer to each other than others around:
     the first and the last, and so many between that none is near the one before."""
     count = len(places)

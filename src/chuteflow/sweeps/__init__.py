@@ -1,1 +1,1 @@
-"""Studies of very many chutes: designs, an engine that treats them side by side, and a store that survives anything."""
+"""Studies of very many chutes: designs, an engine that treats them in batches, and a store that survives all ends."""

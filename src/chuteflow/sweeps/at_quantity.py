@@ -13,7 +13,7 @@ zero of one function of the surface temperature.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import zeros
 from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.sweeps.aligned import Aligned
 from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
@@ -35,7 +36,7 @@ _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
 _MOST = 12
 #: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
-#: Rounds of new columns. The few lanes that want more are searched one by one, which is cheaper by then.
+#: Rounds of new columns. The few members that want more are searched one by one, which is cheaper by then.
 _ROUNDS = 14
 #: The range is widened at most so often, where ln of the quantity rises at least with this power of T.
 _WIDENINGS, _LEADS = 4, 0.25
@@ -49,7 +50,7 @@ _ASIDE, _AWAY, _LITTLE = 1.0, 1.0, 1e-3
 #: Between columns a quantity departs from its values there by at most this part of what its slope changes over the
 #: step; and what rough columns may be off.
 _SAG, _NOISE = 0.5, 2e-5
-#: In steps of ln T narrower than this rough columns do not tell turns from noise: such lanes are searched one by one.
+#: In steps of ln T narrower than this rough columns do not tell turns from noise: such members are searched one by one.
 _NARROWEST = 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
@@ -58,33 +59,31 @@ _MEETS = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns in order of lanes and temperature: ``lane`` and ``log_t`` (c,), how many flows each has (c,), -1 where
-    that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
+class Columns(Aligned):
+    """Columns in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
+    where that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
 
-    lane: Indices
+    member: Indices
     log_t: Array
     count: Indices
     flows: Array
 
     def joined(self, other: Columns) -> Columns:
         """Both in order."""
-        parts = [np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)]
-        order = np.lexsort((parts[1], parts[0]))
-        return Columns(*(part[order] for part in parts))
+        both = self.and_all([other])
+        return both.take(np.lexsort((both.log_t, both.member)))
 
-    def of(self, lanes: NDArray[np.bool_]) -> Columns:
-        """The columns of some lanes."""
-        keep = lanes[self.lane]
-        return Columns(*(part[keep] for part in vars(self).values()))
+    def of(self, members: NDArray[np.bool_]) -> Columns:
+        """The columns of some members."""
+        return self.take(members[self.member])
 
 
 @dataclass(frozen=True, eq=False)
-class Brackets:
-    """Flows that lie between two columns: ``lane``, ``place`` among the flows from the surface, ends in ln T and the
+class Brackets(Aligned):
+    """Flows that lie between two columns: ``member``, ``place`` among the flows from the surface, ends in ln T and the
     ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
 
-    lane: Indices
+    member: Indices
     place: Indices
     low: Array
     high: Array
@@ -96,7 +95,7 @@ class Brackets:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """The chutes, the quantity asked for by its place in the macroscopic ones, ln of its values (n,), and the ends of
-    the lanes."""
+    the members."""
 
     batch: Batch
     which: int
@@ -104,28 +103,26 @@ class Problem:
     ends: Ends
     deepest: Array
 
-    def columns(self, lane: Indices, log_t: Array) -> Columns:
-        """Rough columns of ``lane`` (c,) at ``log_t`` (c,)."""
-        found, trouble = self._marched(lane, log_t, _ROUGH)
+    def columns(self, member: Indices, log_t: Array) -> Columns:
+        """Rough columns of ``member`` (c,) at ``log_t`` (c,)."""
+        found, trouble = self._marched(member, log_t, _ROUGH)
         again = np.flatnonzero(trouble)
         if again.size:
-            thin, still = self._marched(lane[again], log_t[again], _THIN)
-            found = Flows.joined(
-                [found.take(~trouble[found.lane]), Flows(again[thin.lane], *list(vars(thin).values())[1:])]
-            )
+            thin, still = self._marched(member[again], log_t[again], _THIN)
+            found = Flows.joined([found.take(~trouble[found.member]), replace(thin, member=again[thin.member])])
             trouble[again] = still
-        found = found.take(np.lexsort((found.macroscopic[LOG_M], found.lane)))
-        count = np.bincount(found.lane, minlength=lane.size)
-        place = np.arange(found.lane.size) - (np.cumsum(count) - count)[found.lane]
+        found = found.take(np.lexsort((found.macroscopic[LOG_M], found.member)))
+        count = np.bincount(found.member, minlength=member.size)
+        place = np.arange(found.member.size) - (np.cumsum(count) - count)[found.member]
         kept = place < _MOST
-        flows = np.full((lane.size, _MOST, 3), np.nan)
-        flows[found.lane[kept], place[kept]] = found.macroscopic[:LOG_T, kept].T
+        flows = np.full((member.size, _MOST, 3), np.nan)
+        flows[found.member[kept], place[kept]] = found.macroscopic[:LOG_T, kept].T
         count[trouble | (count > _MOST)] = -1
-        return Columns(lane, log_t, count, flows)
+        return Columns(member, log_t, count, flows)
 
-    def _marched(self, lane: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
-        some, temperature = self.batch.take(lane), np.exp(log_t)
-        found = march(some, temperature, self.ends.take(lane), accuracy, meets_base)
+    def _marched(self, member: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
+        some, temperature = self.batch.take(member), np.exp(log_t)
+        found = march(some, temperature, self.ends.take(member), accuracy, meets_base)
         return flows_on(some, temperature, found), found.trouble
 
 
@@ -138,7 +135,7 @@ def at_quantity(
     tolerance: float,
 ) -> tuple[Flows, NDArray[np.bool_]]:
     """Every flow with surface temperature and hold-up in the range at which the quantity ``which`` has the values
-    (n,), and the lanes (n,) that could not be settled to ``tolerance``, which have none of those returned."""
+    (n,), and the members (n,) that could not be settled to ``tolerance``, which have none of those returned."""
     target = np.log(value)
     holdups = np.full(len(batch), largest_holdup)
     if which == LOG_M:
@@ -147,47 +144,46 @@ def at_quantity(
     problem = Problem(batch, which, target, Ends.of(batch, deepest), np.log(holdups))
     low, high = np.log(surface_temperature)
     many = max(int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE)), 2) + 1
-    lanes = np.arange(len(batch))
-    columns = problem.columns(np.repeat(lanes, many), np.tile(np.linspace(low, high, many), len(batch)))
+    members = np.arange(len(batch))
+    columns = problem.columns(np.repeat(members, many), np.tile(np.linspace(low, high, many), len(batch)))
     for edge in (1, -1):
         columns = _widened(problem, columns, edge)
     unsettled = np.zeros(len(batch), dtype=bool)
     brackets: list[Brackets] = []
     for _ in range(_ROUNDS):
-        unsettled[columns.lane[columns.count < 0]] = True
-        unsettled[columns.lane[_deeper(problem, columns)]] = True
+        unsettled[columns.member[columns.count < 0]] = True
+        unsettled[columns.member[_deeper(problem, columns)]] = True
         columns = columns.of(~unsettled)
         found, split, lost = _links(problem, columns)
-        unsettled[columns.lane[lost]] = True
-        # A lane is done when none of its gaps is split.
+        unsettled[columns.member[lost]] = True
+        # A member is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
-        ready[columns.lane[split]] = False
+        ready[columns.member[split]] = False
         ready &= ~unsettled
-        brackets.append(_chosen(found, ready))
+        brackets.append(found.take(ready[found.member]))
         going = ~ready & ~unsettled
-        if not going[columns.lane].any():
+        if not going[columns.member].any():
             columns = columns.of(going)
             break
-        split = split[going[columns.lane[split]]]
+        split = split[going[columns.member[split]]]
         middle = 0.5 * (columns.log_t[split] + columns.log_t[split + 1])
-        columns = columns.joined(problem.columns(columns.lane[split], middle)).of(going)
-    unsettled[columns.lane] = True
-    whole = Brackets(*(np.concatenate(part) for part in zip(*(vars(b).values() for b in brackets), strict=True)))
-    flows, failed = _found(problem, whole, tolerance)
+        columns = columns.joined(problem.columns(columns.member[split], middle)).of(going)
+    unsettled[columns.member] = True
+    flows, failed = _found(problem, brackets[0].and_all(brackets[1:]), tolerance)
     unsettled |= failed
-    inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.lane]) & ~unsettled[flows.lane]
+    inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.member]) & ~unsettled[flows.member]
     return Flows.joined([flows.take(inside)]), unsettled
 
 
 def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
-    """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each lane, where flows lead out of the range
+    """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the range
     towards the value asked for, as :func:`chuteflow.flows` has it."""
     for _ in range(_WIDENINGS):
-        ends = np.flatnonzero(np.diff(columns.lane, append=-1) if edge > 0 else np.diff(columns.lane, prepend=-1))
+        ends = np.flatnonzero(np.diff(columns.member, append=-1) if edge > 0 else np.diff(columns.member, prepend=-1))
         before = ends - edge
         a, b = columns.flows[before], columns.flows[ends]
         run = (columns.log_t[ends] - columns.log_t[before])[:, None]
-        left = problem.target[columns.lane[ends], None] - b[..., problem.which]
+        left = problem.target[columns.member[ends], None] - b[..., problem.which]
         alike = (np.abs(a - b) <= _APART + _BY_TEMPERATURE * np.abs(run)[..., None]).all(axis=-1)
         slope = (b - a)[..., problem.which] / run
         with np.errstate(invalid="ignore"):
@@ -199,43 +195,38 @@ def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
         if not many.any():
             break
         which = np.repeat(np.arange(ends.size), many)
-        share = (np.arange(which.size) - (np.cumsum(many) - many)[which] + 1) / many[which]
-        new = columns.log_t[ends[which]] + edge * reach[which] * share
-        columns = columns.joined(problem.columns(columns.lane[ends[which]], new))
+        fraction = (np.arange(which.size) - (np.cumsum(many) - many)[which] + 1) / many[which]
+        new = columns.log_t[ends[which]] + edge * reach[which] * fraction
+        columns = columns.joined(problem.columns(columns.member[ends[which]], new))
     return columns
 
 
 def _deeper(problem: Problem, columns: Columns) -> NDArray[np.bool_]:
     """The columns with flows near the largest hold-up that may lead beyond it, to the value asked for."""
-    log_m, target = columns.flows[..., LOG_M], problem.target[columns.lane, None]
+    log_m, target = columns.flows[..., LOG_M], problem.target[columns.member, None]
     left = target - columns.flows[..., problem.which]
     with np.errstate(invalid="ignore"):
-        at_edge = log_m > problem.deepest[columns.lane, None] - _AT_EDGE
+        at_edge = log_m > problem.deepest[columns.member, None] - _AT_EDGE
         within_reach = (left > 0.0) & (left < _STEEPEST * (np.log(DEEPEST) - log_m))
     return (at_edge & within_reach).any(axis=1) & (problem.which != LOG_M)
-
-
-def _chosen(brackets: Brackets, lanes: NDArray[np.bool_]) -> Brackets:
-    keep = lanes[brackets.lane]
-    return Brackets(*(part[keep] for part in vars(brackets).values()))
 
 
 def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indices]:
     """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
     hide more, and wants a column, and those after which columns do not tell."""
-    left = np.flatnonzero(columns.lane[1:] == columns.lane[:-1])
+    left = np.flatnonzero(columns.member[1:] == columns.member[:-1])
     right = left + 1
-    lane = columns.lane[left]
+    member = columns.member[left]
     a, b = columns.flows[left], columns.flows[right]
     n_a, n_b = columns.count[left], columns.count[right]
     step = columns.log_t[right] - columns.log_t[left]
     apart = _APART + _BY_TEMPERATURE * step
-    deepest = problem.deepest[lane]
+    deepest = problem.deepest[member]
     # From the surface down the flows go over into each other, up to the first that does not.
     alike = (np.abs(a - b) <= apart[:, None, None]).all(axis=-1)
     first = np.cumprod(alike, axis=1).sum(axis=1)
-    off_a = a[..., problem.which] - problem.target[lane, None]
-    off_b = b[..., problem.which] - problem.target[lane, None]
+    off_a = a[..., problem.which] - problem.target[member, None]
+    off_b = b[..., problem.which] - problem.target[member, None]
     place = np.arange(_MOST)
     linked = place < first[:, None]
     crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
@@ -245,7 +236,7 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indic
     rows, places = np.nonzero(crossing)
     log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
     found = Brackets(
-        lane[rows],
+        member[rows],
         places,
         columns.log_t[left[rows]],
         columns.log_t[right[rows]],
@@ -304,8 +295,8 @@ def _turning(
     """The gaps, after the columns ``left``, in which the quantity may turn along a family so near to its value that it
     passes it between columns without a change of sign, or more than once with one."""
     step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
-    # Of all gaps in order, those between lanes missing.
-    slope = np.full((columns.lane.size - 1, _MOST), np.nan)
+    # Of all gaps in order, those between members missing.
+    slope = np.full((columns.member.size - 1, _MOST), np.nan)
     slope[left] = np.where(linked, (off_b - off_a) / step, np.nan)
     change = np.abs(np.diff(slope, axis=0, prepend=np.nan, append=np.nan))
     noise = np.ones((len(slope), 1))
@@ -320,15 +311,15 @@ def _turning(
 
 
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
-    """The flows in the brackets, and the lanes on which one could not be found to ``tolerance``."""
+    """The flows in the brackets, and the members on which one could not be found to ``tolerance``."""
     failed = np.zeros(len(problem.batch), dtype=bool)
     near = Near(problem, brackets)
     log_t, slope = near.rough()
-    pending = np.arange(brackets.lane.size)
+    pending = np.arange(brackets.member.size)
     flows: list[Flows] = []
     for coarser, finer in itertools.pairwise(LADDER):
         good = np.isfinite(log_t[pending])
-        failed[brackets.lane[pending[~good]]] = True
+        failed[brackets.member[pending[~good]]] = True
         pending = pending[good]
         if not pending.size:
             break
@@ -336,7 +327,7 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
         there = near.at(pending, log_t[pending], finer)
         # What changes at a given surface temperature is carried over to the given quantity.
         change = there.macroscopic[:LOG_T] - here[:LOG_T]
-        off = there.macroscopic[problem.which] - problem.target[brackets.lane[pending]]
+        off = there.macroscopic[problem.which] - problem.target[brackets.member[pending]]
         along = near.gradient(pending) / slope[pending]
         carried = np.abs(change - along * change[problem.which])
         rest = np.abs(along * (off - change[problem.which]))
@@ -345,11 +336,11 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
         moved = there.macroscopic.copy()
         moved[:LOG_T] -= near.gradient(pending) * (off / slope[pending])
         moved[LOG_T] -= off / slope[pending]
-        lane = brackets.lane[pending]
+        member = brackets.member[pending]
         done = error <= tolerance
-        flows.append(Flows(lane, np.exp(moved[LOG_T]), there.state, moved, error).take(done))
+        flows.append(Flows(member, np.exp(moved[LOG_T]), there.state, moved, error).take(done))
         pending = pending[~done]
-    failed[brackets.lane[pending]] = True
+    failed[brackets.member[pending]] = True
     return Flows.joined(flows), failed
 
 
@@ -358,12 +349,12 @@ class Near:
 
     def __init__(self, problem: Problem, brackets: Brackets) -> None:
         self._problem, self._brackets = problem, brackets
-        self._batch = problem.batch.take(brackets.lane)
+        self._batch = problem.batch.take(brackets.member)
         # A little below the flow is deep enough.
         deep = problem.batch.surface_stress + 1.5 * np.exp(brackets.log_m)
-        self._ends = problem.ends.take(brackets.lane).above(deep)
-        self._target = problem.target[brackets.lane]
-        self._gradient = np.zeros((3, brackets.lane.size))
+        self._ends = problem.ends.take(brackets.member).above(deep)
+        self._target = problem.target[brackets.member]
+        self._gradient = np.zeros((3, brackets.member.size))
 
     def gradient(self, which: Indices) -> Array:
         """d (ln Q, ln h, ln M)/d ln T_surface along the family, (3, m)."""
@@ -373,10 +364,10 @@ class Near:
         """The flows ``which`` (m,) at ``log_t`` (m,), one each; NaN where it is not there."""
         some, temperature = self._batch.take(which), np.exp(log_t)
         found = march(some, temperature, self._ends.take(which), accuracy, meets_base)
-        count = np.bincount(found.lane, minlength=which.size)
+        count = np.bincount(found.member, minlength=which.size)
         index = (np.cumsum(count) - count) + self._brackets.place[which]
         there = (self._brackets.place[which] < count) & ~found.trouble
-        safe = np.minimum(index, max(found.lane.size - 1, 0))
+        safe = np.minimum(index, max(found.member.size - 1, 0))
         state = np.full((found.state.shape[0], which.size), np.nan)
         state[:, there] = found.state[:, safe[there]]
         with np.errstate(invalid="ignore"):

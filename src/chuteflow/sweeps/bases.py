@@ -1,7 +1,7 @@
 """Every flow of many chutes at given surface temperatures, each with its error.
 
 A trajectory from the surface knows nothing of the base, and every flow of its surface temperature is a point of
-it (:mod:`chuteflow.sweeps.marching`). All lanes are integrated once, and those with flows again with smaller
+it (:mod:`chuteflow.sweeps.marching`). All members are integrated once, and those with flows again with smaller
 tolerances, until what changes is small enough.
 """
 
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
+from chuteflow.sweeps.aligned import Aligned
 from chuteflow.sweeps.batch import GLIDE, LOG_P, MOMENT, ROWS, Along, Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
 
-#: Accuracies, one after the other: a lane goes on to the next until its flows are settled.
+#: Accuracies, one after the other: a member goes on to the next until its flows are settled.
 LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Accuracy(1e-12, 1e-8))
 #: The error claimed is this many times the change from one accuracy to the next.
 SAFETY = 3.0
@@ -28,37 +29,24 @@ _BELOW = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class Flows:
-    """Flows of a batch: the ``lane`` (k,) of each, its ``temperature`` at the surface and ``state`` (ROWS, k) at the
+class Flows(Aligned):
+    """Flows of a batch: the ``member`` (k,) of each, its ``temperature`` at the surface and ``state`` (ROWS, k) at the
     base, the logarithms ``macroscopic`` (4, k) of Q, h, M and T_surface, and its relative ``error``."""
 
-    lane: Indices
+    BY_COLUMN = ("state", "macroscopic")
+
+    member: Indices
     temperature: Array
     state: Array
     macroscopic: Array
     error: Array
 
-    def take(self, which: NDArray[np.bool_] | Indices) -> Flows:
-        """The flows ``which``."""
-        return Flows(
-            self.lane[which],
-            self.temperature[which],
-            self.state[:, which],
-            self.macroscopic[:, which],
-            self.error[which],
-        )
-
     @classmethod
     def joined(cls, parts: list[Flows]) -> Flows:
-        """All flows, in order of lanes, from hot to cold, then by hold-up."""
-        whole = cls(
-            np.concatenate([np.empty(0, dtype=np.intp), *(p.lane for p in parts)]),
-            np.concatenate([np.empty(0), *(p.temperature for p in parts)]),
-            np.concatenate([np.empty((ROWS, 0)), *(p.state for p in parts)], axis=1),
-            np.concatenate([np.empty((4, 0)), *(p.macroscopic for p in parts)], axis=1),
-            np.concatenate([np.empty(0), *(p.error for p in parts)]),
-        )
-        order = np.lexsort((whole.macroscopic[LOG_M], -whole.temperature, whole.lane))
+        """All flows, in order of members, from hot to cold, then by hold-up."""
+        none = np.empty(0)
+        whole = cls(np.empty(0, dtype=np.intp), none, np.empty((ROWS, 0)), np.empty((4, 0)), none).and_all(parts)
+        order = np.lexsort((whole.macroscopic[LOG_M], -whole.temperature, whole.member))
         return whole.take(order)
 
 
@@ -69,48 +57,48 @@ def meets_base(at: Along, _: Indices) -> Array:
 
 def flows_on(batch: Batch, temperature: Array, found: Found) -> Flows:
     """The zeros of :func:`meets_base` as flows, without an error as yet."""
-    lane, state = found.lane, found.state
-    at = batch.take(lane).along(state)
+    member, state = found.member, found.state
+    at = batch.take(member).along(state)
     mass = at.p - batch.surface_stress
     flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[GLIDE]
-    macroscopic = np.empty((4, lane.size))
+    macroscopic = np.empty((4, member.size))
     macroscopic[LOG_Q] = np.log(np.maximum(flux, np.finfo(float).tiny))
     macroscopic[LOG_H] = np.log(at.p * state[MOMENT] / mass)
     macroscopic[LOG_M] = np.log(mass)
-    macroscopic[LOG_T] = np.log(temperature[lane])
-    return Flows(lane, temperature[lane], state, macroscopic, np.full(lane.size, np.inf))
+    macroscopic[LOG_T] = np.log(temperature[member])
+    return Flows(member, temperature[member], state, macroscopic, np.full(member.size, np.inf))
 
 
 def at_temperature(
     batch: Batch, temperature: Array, largest_holdup: float, tolerance: float
 ) -> tuple[Flows, NDArray[np.bool_]]:
-    """Every flow at the surface temperatures (n,) with hold-ups up to ``largest_holdup``, and the lanes (n,) on
+    """Every flow at the surface temperatures (n,) with hold-ups up to ``largest_holdup``, and the members (n,) on
     which that could not be settled to ``tolerance``, which have no flow among those returned."""
     deepest = np.full(len(batch), largest_holdup + batch.surface_stress)
     ends = Ends.of(batch, deepest)
     coarse = march(batch, temperature, ends, LADDER[0], meets_base)
     unsettled = coarse.trouble.copy()
-    unsettled[coarse.lane] = True
+    unsettled[coarse.member] = True
     previous = flows_on(batch, temperature, coarse)
     settled: list[Flows] = []
     for finer in LADDER[1:]:
         pending = np.flatnonzero(unsettled)
         if not pending.size:
             break
-        previous = previous.take(unsettled[previous.lane])
+        previous = previous.take(unsettled[previous.member])
         last = np.full(len(batch), 0.0)
-        np.maximum.at(last, previous.lane, _BELOW * np.exp(previous.state[LOG_P]))
+        np.maximum.at(last, previous.member, _BELOW * np.exp(previous.state[LOG_P]))
         last[coarse.trouble] = np.inf
         there = ends.take(pending).above(last[pending])
         found = march(batch.take(pending), temperature[pending], there, finer, meets_base)
-        fine = flows_on(batch, temperature, Found(pending[found.lane], found.state, unsettled))
+        fine = flows_on(batch, temperature, Found(pending[found.member], found.state, unsettled))
         trouble = np.zeros(len(batch), dtype=bool)
         trouble[pending] = found.trouble
         fine, agreed = compared(len(batch), previous, fine, least_error(finer))
         worst = np.zeros(len(batch))
-        np.maximum.at(worst, fine.lane, fine.error)
+        np.maximum.at(worst, fine.member, fine.error)
         done = unsettled & agreed & ~trouble & (worst <= tolerance)
-        settled.append(fine.take(done[fine.lane]))
+        settled.append(fine.take(done[fine.member]))
         unsettled &= ~done
         previous = fine
     out = Flows.joined(settled)
@@ -122,13 +110,13 @@ def least_error(accuracy: Accuracy) -> float:
     return max(_FLOOR, _CHANCE * accuracy.tolerance)
 
 
-def compared(lanes: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
+def compared(members: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
     """The finer flows with the error that their distance from the coarser ones tells, at ``least`` so much, and the
-    lanes on which both are equally many."""
-    many = np.bincount(coarse.lane, minlength=lanes)
-    agreed = many == np.bincount(fine.lane, minlength=lanes)
-    error = np.full(fine.lane.size, np.inf)
-    # Both are in order of lanes, and along each from the surface down.
-    change = np.abs(fine.macroscopic[:, agreed[fine.lane]] - coarse.macroscopic[:, agreed[coarse.lane]])
-    error[agreed[fine.lane]] = np.maximum(SAFETY * change[:LOG_T].max(axis=0, initial=0.0), least)
-    return Flows(fine.lane, fine.temperature, fine.state, fine.macroscopic, error), agreed
+    members on which both are equally many."""
+    many = np.bincount(coarse.member, minlength=members)
+    agreed = many == np.bincount(fine.member, minlength=members)
+    error = np.full(fine.member.size, np.inf)
+    # Both are in order of members, and along each from the surface down.
+    change = np.abs(fine.macroscopic[:, agreed[fine.member]] - coarse.macroscopic[:, agreed[coarse.member]])
+    error[agreed[fine.member]] = np.maximum(SAFETY * change[:LOG_T].max(axis=0, initial=0.0), least)
+    return Flows(fine.member, fine.temperature, fine.state, fine.macroscopic, error), agreed

@@ -1,4 +1,4 @@
-"""Many chutes side by side: the steady problem as an initial value problem, one lane for each chute.
+"""Many chutes in a batch: the steady problem as an initial value problem, one member for each chute.
 
 # notation: p normal stress, P = p - p_S overburden, nu volume fraction, X = nu/(1 - nu/nu*), L = ln X,
 # y = q/(p sqrt(T)) heat flux, a conduction, s slope, net = loss - s^2 work; k = (g4/g3) nu/D,
@@ -9,7 +9,7 @@ From the surface down, with v = p y/a and P T = p P/g1:
     dL/dln p = (1 - v)/(D dln nu/dln X),    dy/dln p = p net - y - y (v + k (1 - v))/2
 
 The integrals of P dz and P du go with them over p and p^2, in which form they are uniform close to a free surface.
-The closures are evaluated as they stand, so that every lane may have its own restitution; where all lanes have
+The closures are evaluated as they stand, so that every member may have its own restitution; where all members have
 one, nothing else would be gained by tables.
 """
 
@@ -31,7 +31,7 @@ Indices = NDArray[np.intp]
 #: Rows of a state: ln p, ln X, y, the integral of P dz over p, that of P du over p^2, and that of dz.
 LOG_P, LOG_X, FLUX, MOMENT, GLIDE, HEIGHT = range(6)
 ROWS = 6
-#: Densities at which the speed of a lane's equations is looked up, and others at which the sign of net is.
+#: Densities at which the speed of a member's equations is looked up, and others at which the sign of net is.
 _DENSITIES = np.append(0.0, np.logspace(-3.0, 4.0, 15))
 _SIGNS = np.append(0.0, np.logspace(-2.5, 4.0, 60))
 
@@ -72,9 +72,9 @@ class Batch:
     def __len__(self) -> int:
         return len(self.slope)
 
-    def take(self, lanes: Indices) -> Batch:
-        """The batch of the chutes ``lanes``, which may repeat."""
-        arrays = [getattr(self, field.name)[lanes] for field in fields(self)[2:]]
+    def take(self, members: Indices) -> Batch:
+        """The batch of the chutes ``members``, which may repeat."""
+        arrays = [getattr(self, field.name)[members] for field in fields(self)[2:]]
         return Batch(self.law, self.surface, *arrays)
 
     @property
@@ -121,7 +121,7 @@ _ZERO, _ONE = np.zeros(()), np.ones(())
 
 
 class Along:
-    """The closures and the balance at one point of every lane, arrays of the shape of ``p``."""
+    """The closures and the balance at one point of every member, arrays of the shape of ``p``."""
 
     __slots__ = ("_base", "_batch", "_reduced", "conduction", "coupling", "ease", "log_x", "net", "nu", "p", "v", "y")
 
@@ -179,8 +179,8 @@ class Along:
         out[LOG_P] = 1.0
         out[LOG_X] = still * self.ease
         out[FLUX] = p * self.net - y * (1.0 + 0.5 * (self.v + self.coupling * still))
-        share = 1.0 - batch.surface_stress / p if batch.surface_stress else 1.0
+        fraction = 1.0 - batch.surface_stress / p if batch.surface_stress else 1.0
         thickness = p / self.nu
-        out[MOMENT] = share * thickness - state[MOMENT]
-        out[GLIDE] = share * (batch.slope * self.work) * np.sqrt(self.temperature) - 2.0 * state[GLIDE]
+        out[MOMENT] = fraction * thickness - state[MOMENT]
+        out[GLIDE] = fraction * (batch.slope * self.work) * np.sqrt(self.temperature) - 2.0 * state[GLIDE]
         out[HEIGHT] = thickness

@@ -62,8 +62,8 @@ class Axis:
         if not self.ranged:
             return self.values[places]
         # As numpy.linspace has it to the last bit, without the values that are not asked for.
-        share = np.where(places == self.steps - 1, 1.0, places * (1.0 / (self.steps - 1)))
-        return _between(self.low, self.high, share, self.log)
+        fraction = np.where(places == self.steps - 1, 1.0, places * (1.0 / (self.steps - 1)))
+        return _between(self.low, self.high, fraction, self.log)
 
     @property
     def extremes(self) -> tuple[float, float]:
@@ -72,11 +72,11 @@ class Axis:
             return self.low, self.high
         return float(self.values.min()), float(self.values.max())
 
-    def at(self, share: Array) -> Array:
-        """Values at shares from 0 to 1: of the range, or of the list of values."""
+    def at(self, fraction: Array) -> Array:
+        """Values at fractions from 0 to 1: of the range, or of the list of values."""
         if self.ranged:
-            return _between(self.low, self.high, share, self.log)
-        return self.values[np.minimum((share * len(self.values)).astype(np.intp), len(self.values) - 1)]
+            return _between(self.low, self.high, fraction, self.log)
+        return self.values[np.minimum((fraction * len(self.values)).astype(np.intp), len(self.values) - 1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +163,12 @@ def _range(name: str, key: str, value: Mapping[str, Any]) -> Axis:
     return Axis(name, np.empty(0), (), low, high, scale == "log", True, count)
 
 
-def _between(low: float, high: float, share: Array, log: bool) -> Array:
-    inside = np.exp(math.log(low) + share * (math.log(high) - math.log(low))) if log else low + share * (high - low)
+def _between(low: float, high: float, fraction: Array, log: bool) -> Array:
+    inside = (
+        np.exp(math.log(low) + fraction * (math.log(high) - math.log(low))) if log else low + fraction * (high - low)
+    )
     # The ends are the numbers given, to the last digit.
-    return np.where(share == 1.0, high, np.where(share == 0.0, low, inside))
+    return np.where(fraction == 1.0, high, np.where(fraction == 0.0, low, inside))
 
 
 @dataclass(frozen=True)
@@ -201,9 +203,9 @@ def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
 
     def rows(first: int, last: int) -> dict[str, Array]:
         begin = first // _BLOCK
-        shares = np.concatenate([block(b) for b in range(begin, -(-last // _BLOCK))])
-        shares = shares[first - begin * _BLOCK : last - begin * _BLOCK]
-        return _at(axes, shares)
+        fractions = np.concatenate([block(b) for b in range(begin, -(-last // _BLOCK))])
+        fractions = fractions[first - begin * _BLOCK : last - begin * _BLOCK]
+        return _at(axes, fractions)
 
     return Design(points, axes, rows)
 
@@ -219,9 +221,10 @@ def _sobol(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     return Design(points, axes, rows)
 
 
-def _at(axes: Mapping[str, Axis], shares: Array) -> dict[str, Array]:
+def _at(axes: Mapping[str, Axis], fractions: Array) -> dict[str, Array]:
     return {
-        name: axis.at(np.ascontiguousarray(column)) for (name, axis), column in zip(axes.items(), shares.T, strict=True)
+        name: axis.at(np.ascontiguousarray(column))
+        for (name, axis), column in zip(axes.items(), fractions.T, strict=True)
     }
 
 

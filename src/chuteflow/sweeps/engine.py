@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.enumeration import flows as search
+from chuteflow.branches.enumeration import flows_within
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
-from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
+from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
@@ -26,7 +26,11 @@ from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
 
-_WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M}
+_WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
+#: Down to this hold-up columns are taken to lose no flows; the least at which they lost some is 4.79.
+_SHALLOW = 3.0
+#: Trajectories are followed to where their flux by shear is so many times that asked for.
+_FURTHER = 3.0
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
 _RESTITUTIONS = 257
 #: What a calculation may end with that is no reason to stop the others.
@@ -69,27 +73,38 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     valid = _valid(study, out.parameters, failures)
     out.status[~valid] = Status.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
-    # Lanes side by side have the base of the paper.
+    # Members of a batch have the base of the paper.
     other = _on_other_bases(study, out.parameters) & valid
     singly, winding = int(other.sum()), 0
     for point in np.flatnonzero(other).tolist():
         _fill_singly(study, out, point, failures)
     out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
     valid &= ~other
-    for closure, surface, members in _groups(study, out.parameters, valid):
-        batch = _batch(closure, surface, out.parameters, members)
-        # Surface temperatures that are given are followed down one by one; no family of flows has to be found.
-        winds = batch.winding() if study.condition != "T_surface" else np.zeros(len(batch), dtype=bool)
+    for closure, surface, points in _groups(study, out.parameters, valid):
+        batch = _batch(closure, surface, out.parameters, points)
+        value = out.parameters[study.condition][points]
+        winds = _may_lose_flows(study, batch, value)
         others = np.flatnonzero(~winds)
-        solved = _solved(study, batch.take(others), out.parameters[study.condition][members[others]])
-        _fill(study, out, members[others], solved)
-        for point in [*members[winds].tolist(), *members[others[solved.unsettled]].tolist()]:
+        solved = _solved(study, batch.take(others), value[others])
+        _fill(study, out, points[others], solved)
+        for point in [*points[winds].tolist(), *points[others[solved.unsettled]].tolist()]:
             _fill_singly(study, out, point, failures)
         winding += int(winds.sum())
         singly += int(solved.unsettled.sum())
-        _fill_reasons(out, batch, members)
+        _fill_reasons(out, batch, points)
     told = {first + i: why for i, why in sorted(failures.items())}
     return replace(out, failures=told, singly=singly, winding=winding)
+
+
+def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
+    """The members on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
+
+    Given surface temperatures are followed down one by one, so that no family of flows has to be found; a given hold-up
+    need not be followed further.
+    """
+    if study.condition == "T_surface":
+        return np.zeros(len(batch), dtype=bool)
+    return batch.winding() & (value > _SHALLOW if study.condition == "M" else True)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
@@ -160,20 +175,20 @@ def _groups(
     """Closure, surface and points of the groups that share both."""
     for i, closure in enumerate(study.laws):
         for j, surface in enumerate(SURFACES):
-            members = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
-            if members.size:
-                yield closure, surface, members
+            points = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
+            if points.size:
+                yield closure, surface, points
 
 
-def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], members: Indices) -> Batch:
-    roughness = np.minimum(parameters["roughness"][members], BY_KEY["roughness"].high)
-    slope, e, ew = (np.ascontiguousarray(parameters[name][members]) for name in ("slope", "e", "ew"))
+def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], points: Indices) -> Batch:
+    roughness = np.minimum(parameters["roughness"][points], BY_KEY["roughness"].high)
+    slope, e, ew = (np.ascontiguousarray(parameters[name][points]) for name in ("slope", "e", "ew"))
     return Batch.of(closure, surface, slope, e, ew, roughness)
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Every flow of a batch (k,), its quantities by name (k,), and the lanes (n,) to be solved one by one."""
+    """Every flow of a batch (k,), its quantities by name (k,), and the members (n,) to be solved one by one."""
 
     flows: Flows
     quantities: Mapping[str, Array]
@@ -182,7 +197,7 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    are judged, or the law has breaks, at which integration side by side would lose its order."""
+    are judged, or the law has breaks, at which integration in a batch would lose its order."""
     if not len(batch) or wanted(study.quantities) or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
@@ -202,40 +217,40 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     except _FAILURES:
         if len(batch) == 1:
             return _Solved(Flows.joined([]), dict.fromkeys(study.quantities, np.empty(0)), np.ones(1, dtype=bool))
-    # One lane must not keep the others from being solved: it is found by halves.
+    # One member must not keep the others from being solved: it is found by halves.
     half = len(batch) // 2
-    lanes = np.arange(len(batch))
-    one, two = (_solved(study, batch.take(some), value[some]) for some in (lanes[:half], lanes[half:]))
+    members = np.arange(len(batch))
+    one, two = (_solved(study, batch.take(some), value[some]) for some in (members[:half], members[half:]))
     return _Solved(
-        Flows.joined([one.flows, replace(two.flows, lane=two.flows.lane + half)]),
+        Flows.joined([one.flows, replace(two.flows, member=two.flows.member + half)]),
         {name: np.concatenate([one.quantities[name], two.quantities[name]]) for name in study.quantities},
         np.concatenate([one.unsettled, two.unsettled]),
     )
 
 
 def _sound(solved: _Solved) -> _Solved:
-    """Without the lanes on which a quantity is not a number: they are solved one by one."""
-    good = np.ones(solved.flows.lane.size, dtype=bool)
+    """Without the members on which a quantity is not a number: they are solved one by one."""
+    good = np.ones(solved.flows.member.size, dtype=bool)
     for values in solved.quantities.values():
         good &= ~np.isnan(values)
     if good.all():
         return solved
     unsettled = solved.unsettled.copy()
-    unsettled[solved.flows.lane[~good]] = True
-    kept = ~unsettled[solved.flows.lane]
+    unsettled[solved.flows.member[~good]] = True
+    kept = ~unsettled[solved.flows.member]
     values = {name: value[kept] for name, value in solved.quantities.items()}
     return _Solved(solved.flows.take(kept), values, unsettled)
 
 
-def _fill(study: Study, out: Chunk, members: Indices, solved: _Solved) -> None:
-    """Put flows, in order of lanes and along each from hot to cold, into the rows of their points."""
+def _fill(study: Study, out: Chunk, points: Indices, solved: _Solved) -> None:
+    """Put flows, in order of members and along each from hot to cold, into the rows of their points."""
     flows = solved.flows
-    counts = np.bincount(flows.lane, minlength=len(members))
-    out.n_flows[members] = counts
-    out.status[members[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
-    place = np.arange(flows.lane.size) - (np.cumsum(counts) - counts)[flows.lane]
+    counts = np.bincount(flows.member, minlength=len(points))
+    out.n_flows[points] = counts
+    out.status[points[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
+    place = np.arange(flows.member.size) - (np.cumsum(counts) - counts)[flows.member]
     kept = place < study.flows
-    where = members[flows.lane[kept]], place[kept]
+    where = points[flows.member[kept]], place[kept]
     out.error[where] = flows.error[kept]
     for name, values in solved.quantities.items():
         out.quantities[name][where] = values[kept]
@@ -252,14 +267,18 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     p = out.parameters
     slope, e, ew, roughness = (float(p[name][point]) for name in BY_KEY)
     surface, closure = SURFACES[int(p["surface"][point])], study.laws[int(p["closure"][point])]
-    condition = {study.condition: float(p[study.condition][point])}
+    base = study.bases[int(p["base"][point]) if "base" in p else 0]
+    value = float(p[study.condition][point])
     try:
-        found = search(
-            Chute(slope, e, ew, roughness, surface, closure, study.bases[int(p["base"][point]) if "base" in p else 0]),
-            **condition,
-            tolerance=study.tolerance,
-            surface_temperature=study.surface_temperature,
-            largest_holdup=study.largest_holdup,
+        found = flows_within(
+            Chute(slope, e, ew, roughness, surface, closure, base),
+            _WHICH[study.condition],
+            value,
+            study.tolerance,
+            study.surface_temperature,
+            # Of this chute nothing else is asked.
+            min(study.largest_holdup, value) if study.condition == "M" else study.largest_holdup,
+            largest_flux=_FURTHER * value if study.condition == "Q" else np.inf,
         )
     except _FAILURES as error:
         out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER
@@ -281,7 +300,7 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
             values[point, k] = KINDS[name].index(value) if name in KINDS else value
 
 
-def _fill_reasons(out: Chunk, batch: Batch, members: Indices) -> None:
-    none = np.flatnonzero((out.n_flows[members] == 0) & (out.status[members] == Status.COMPLETE))
+def _fill_reasons(out: Chunk, batch: Batch, points: Indices) -> None:
+    none = np.flatnonzero((out.n_flows[points] == 0) & (out.status[points] == Status.COMPLETE))
     if none.size:
-        out.reason[members[none]] = reasons(batch.take(none))
+        out.reason[points[none]] = reasons(batch.take(none))

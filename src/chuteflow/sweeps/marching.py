@@ -1,12 +1,12 @@
-"""Integration from the surface down of many lanes at once, and the places on the way where something happens.
+"""Integration from the surface down of many members at once, and the places on the way where something happens.
 
 # notation: tau the step variable, d ln p/d tau = 1/(1 + p/p_1): logarithmic in the thin layer at the surface,
 # uniform below.
 
-The method is DOP853 (Hairer, Norsett & Wanner 1993), each lane with its own step. An event is a function of the
+The method is DOP853 (Hairer, Norsett & Wanner 1993), each member with its own step. An event is a function of the
 state that changes its sign; it is seen at the stages of a step, and located by shorter steps from the same
 start, which are as accurate as the integration itself. Steps in which an event may have two zeros, or nearly
-has, are looked at more closely. Nothing of a lane depends on the lanes beside it.
+has, are looked at more closely. Nothing of a member depends on the members beside it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import zeros
+from chuteflow.sweeps.aligned import Aligned
 from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Along, Batch, Indices
 
 Event = Callable[[Along, Indices], Array]
 
-#: Lanes treated at once: so many that the interpreter does not count, so few that they fit the cache.
-LANES = 16384
+#: Members treated at once: so many that the interpreter does not count, so few that they fit the cache.
+MEMBERS = 16384
 _DENSE = 60.0
-#: Densities X below which a lane may end as an empty one: the first of them at which that can be told.
+#: Densities X below which a member may end as an empty one: the first of them at which that can be told.
 _THIN = (1e-2, 1e-3, 1e-6)
 #: By how much p is beyond what the empty state asks for, so that X and the coupling of the heat flux do not matter.
 _FIRMLY = 1.2
@@ -35,7 +36,7 @@ _COLD = 4.0
 _MOST_STEPS = 4000
 #: Parts of a step that is looked at more closely.
 _PARTS = 8
-#: A zero is known to this share of its step, or where its event is this small.
+#: A zero is known to this fraction of its step, or where its event is this small.
 _RESOLUTION, _SMALL = 4e-15, 1e-16
 #: A turn of an event this near to zero, in the spread of its values in the step, is looked at more closely.
 _NEAR = 0.3
@@ -45,16 +46,16 @@ _GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.88729833462074
 
 @dataclass(frozen=True)
 class Accuracy:
-    """``tolerance`` of a step, relative, in every row of the state but the height; and the share ``start`` of T, or of
-    a length of the equations, at which the series at a free surface is left."""
+    """``tolerance`` of a step, relative, in every row of the state but the height; and the fraction ``start`` of T, or
+    of a length of the equations, at which the series at a free surface is left."""
 
     tolerance: float
     start: float
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
-    """Where lanes end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
+class Ends(Aligned):
+    """Where members end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
     emptier, with ln X below ``thin``, p above ``settled`` and the heat flux between ``low`` and ``high``, beyond
     which no base is met. ``turn`` is p_1, and ``rate`` the fastest of y in p."""
 
@@ -69,7 +70,7 @@ class Ends:
 
     @classmethod
     def of(cls, batch: Batch, deepest: Array) -> Ends:
-        """The ends of the lanes of ``batch`` at normal stresses ``deepest`` (n,)."""
+        """The ends of the members of ``batch`` at normal stresses ``deepest`` (n,)."""
         rate, balance = batch.pace()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
         thin = np.full(len(batch), -np.inf)
@@ -81,22 +82,18 @@ class Ends:
             settled[new], low[new], high[new] = told[:, new]
         return cls(deepest, floor, thin, settled, low, high, 1.0 / np.maximum(rate, 1e-3), rate)
 
-    def take(self, lanes: Indices) -> Ends:
-        """The ends of ``lanes``."""
-        return Ends(*(part[lanes] for part in vars(self).values()))
-
     def above(self, deepest: Array) -> Ends:
         """The same, but no deeper than ``deepest`` (n,)."""
         return replace(self, deepest=np.minimum(self.deepest, deepest))
 
     def hot(self, p: Array, state: Array, slope: Array) -> NDArray[np.bool_]:
-        """Which lanes have come to their hot end, by their states and derivatives (ROWS, n)."""
+        """Which members have come to their hot end, by their states and derivatives (ROWS, n)."""
         emptier = (slope[LOG_X] < 0.0) & (state[LOG_X] < self.thin) & (p > self.settled)
         return emptier & (state[FLUX] > self.low) & (state[FLUX] < self.high)
 
 
 def _hot_end(batch: Batch, x: float) -> Array:
-    """p, and the least and largest heat flux (3, n), beyond which a lane that is emptier than X meets no base any more;
+    """p, and the least and largest heat flux (3, n), beyond which a member emptier than X meets no base any more;
     infinite where that cannot be told.
 
     In the empty state dv/dln p = p^2 net/a - v^2/2, so that v > 1, with which the density falls, lasts where
@@ -127,13 +124,13 @@ def _span(one: Array, other: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Zeros of an event in order of lanes, along each from the surface down: ``lane`` (k,) and ``state`` (ROWS, k).
+    """Zeros of an event in order of members, along each from the surface down: ``member`` (k,) and ``state`` (ROWS, k).
 
-    ``trouble`` (n,) marks the lanes on which zeros may be missing: where the integration gave up, or a zero lies
+    ``trouble`` (n,) marks the members on which zeros may be missing: where the integration gave up, or a zero lies
     above its start.
     """
 
-    lane: Indices
+    member: Indices
     state: Array
     trouble: NDArray[np.bool_]
 
@@ -159,51 +156,51 @@ def march(
 ) -> Found:
     """All zeros of ``event`` on the trajectories from the surface temperatures ``temperature`` (n,).
 
-    ``event`` takes the fields at one point of some lanes and the numbers of the lanes.
+    ``event`` takes the fields at one point of some members and the numbers of the members.
     """
     n = len(batch)
     trouble = np.zeros(n, dtype=bool)
     zeros: list[tuple[Indices, Array]] = []
-    for first in range(0, n, LANES):
-        lanes = np.arange(first, min(first + LANES, n))
-        lane, state = _march(
-            batch.take(lanes),
-            temperature[lanes],
-            ends.take(lanes),
+    for first in range(0, n, MEMBERS):
+        members = np.arange(first, min(first + MEMBERS, n))
+        member, state = _march(
+            batch.take(members),
+            temperature[members],
+            ends.take(members),
             accuracy,
-            lambda at, some, lanes=lanes: event(at, lanes[some]),
-            trouble[first : first + LANES],
+            lambda at, some, members=members: event(at, members[some]),
+            trouble[first : first + MEMBERS],
         )
-        zeros.append((lanes[lane], state))
-    lane = np.concatenate([z[0] for z in zeros]) if zeros else np.empty(0, dtype=np.intp)
+        zeros.append((members[member], state))
+    member = np.concatenate([z[0] for z in zeros]) if zeros else np.empty(0, dtype=np.intp)
     state = np.concatenate([z[1] for z in zeros], axis=1) if zeros else np.empty((ROWS, 0))
-    order = np.lexsort((state[LOG_P], lane))
-    return Found(lane[order], state[:, order], trouble)
+    order = np.lexsort((state[LOG_P], member))
+    return Found(member[order], state[:, order], trouble)
 
 
 def _march(
     batch: Batch, temperature: Array, ends: Ends, accuracy: Accuracy, event: Event, trouble: NDArray[np.bool_]
 ) -> tuple[Indices, Array]:
     _, _, e3, e5 = _tableau()
-    # What overflows is in a step that is rejected, or on a lane that ends.
+    # What overflows is in a step that is rejected, or on a member that ends.
     with np.errstate(all="ignore"):
         state, above = start(batch, temperature, ends.rate, accuracy.start)
-        lane = np.arange(len(batch))
+        member = np.arange(len(batch))
         here = batch.along(state)
         slope = np.empty_like(state)
         _in_tau(here, state, ends.turn, slope)
-        seen = event(here, lane)
-        trouble |= (event(above, lane) > 0.0) != (seen > 0.0)
+        seen = event(here, member)
+        trouble |= (event(above, member) > 0.0) != (seen > 0.0)
         h = np.full(len(batch), 0.5)
         steps: list[tuple[Indices, Array, Array, Array]] = []
         local, edges = batch, ends
         count = 0
-        while lane.size:
+        while member.size:
             count += 1
-            stages = np.empty((13, ROWS, lane.size))
-            values = np.empty((13, lane.size))
+            stages = np.empty((13, ROWS, member.size))
+            values = np.empty((13, member.size))
             stages[0], values[0] = slope, seen
-            end = _step(local, edges, state, h, stages, values, lambda at, lane=lane: event(at, lane))
+            end = _step(local, edges, state, h, stages, values, lambda at, member=member: event(at, member))
             error = _error(stages, state, end, h, e3, e5, accuracy.tolerance)
             good = error < 1.0
             factor = 0.9 * error**-0.125
@@ -211,7 +208,7 @@ def _march(
             # The first stages of a step into a cold end may not be finite: any such step is cut.
             good &= np.isfinite(end).all(axis=0)
             h_next = h * np.minimum(np.maximum(factor, 0.2), 5.0)
-            _note(lane, state, h, values, good, steps)
+            _note(member, state, h, values, good, steps)
             state = np.where(good, end, state)
             slope = np.where(good, stages[12], slope)
             seen = np.where(good, values[12], seen)
@@ -220,11 +217,11 @@ def _march(
             done = (p >= edges.deepest) | (y < edges.floor) | (state[LOG_X] > _DENSE)
             done |= edges.hot(p, state, slope)
             stuck = ~(h > 1e-9) | (count > _MOST_STEPS)
-            trouble[lane[stuck & ~done]] = True
+            trouble[member[stuck & ~done]] = True
             done |= stuck
             if done.any():
                 keep = np.flatnonzero(~done)
-                lane, state, slope, seen, h = lane[keep], state[:, keep], slope[:, keep], seen[keep], h[keep]
+                member, state, slope, seen, h = member[keep], state[:, keep], slope[:, keep], seen[keep], h[keep]
                 local, edges = local.take(keep), edges.take(keep)
         return _located(batch, ends, steps, event)
 
@@ -237,7 +234,7 @@ def _in_tau(at: Along, state: Array, turn: Array, out: Array) -> None:
 def _step(
     batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Along], Array]
 ) -> Array:
-    """One step of each lane: fills the derivatives (13, ROWS, n) and events (13, n) at the stages after the first,
+    """One step of each member: fills the derivatives (13, ROWS, n) and events (13, n) at the stages after the first,
     and returns the states at the end."""
     a, b, _, _ = _tableau()
     for i in range(1, 12):
@@ -278,7 +275,7 @@ def _error(stages: Array, state: Array, end: Array, h: Array, e3: Array, e5: Arr
 
 
 def _note(
-    lane: Indices,
+    member: Indices,
     state: Array,
     h: Array,
     values: Array,
@@ -294,7 +291,7 @@ def _note(
     turns = (inner < np.minimum(np.abs(seen[0]), np.abs(seen[-1]))) & (nearest < _NEAR * np.ptp(seen, axis=0))
     some = np.flatnonzero(good & (changes | turns))
     if some.size:
-        steps.append((lane[some], state[:, some], h[some], seen[:, some]))
+        steps.append((member[some], state[:, some], h[some], seen[:, some]))
 
 
 def _located(
@@ -303,43 +300,43 @@ def _located(
     """The zeros in the steps kept."""
     if not steps:
         return np.empty(0, dtype=np.intp), np.empty((ROWS, 0))
-    lane = np.concatenate([s[0] for s in steps])
+    member = np.concatenate([s[0] for s in steps])
     state = np.concatenate([s[1] for s in steps], axis=1)
     h = np.concatenate([s[2] for s in steps])
     seen = np.concatenate([s[3] for s in steps], axis=1)
-    walk = Walk(batch.take(lane), ends.take(lane), lane, state, h, event)
+    partial = PartialSteps(batch.take(member), ends.take(member), member, state, h, event)
     positive = seen > 0.0
     changes = (positive[1:] != positive[:-1]).sum(axis=0)
     single = np.flatnonzero((changes == 1) & (positive[0] != positive[-1]))
     low, high = np.zeros(single.size), np.ones(single.size)
     brackets = [(single, low, high, seen[0, single], seen[-1, single])]
-    other = np.setdiff1d(np.arange(lane.size), single)
-    brackets += list(_closer(walk, other, seen[0, other], seen[-1, other]))
+    other = np.setdiff1d(np.arange(member.size), single)
+    brackets += list(_closer(partial, other, seen[0, other], seen[-1, other]))
     which, low, high, f_low, f_high = (np.concatenate(part) for part in zip(*brackets, strict=True))
     which = which.astype(np.intp)
-    share = zeros(lambda some, x: walk.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
-    end, _ = walk.to(which, share)
-    return lane[which], end
+    fraction = zeros(lambda some, x: partial.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
+    end, _ = partial.to(which, fraction)
+    return member[which], end
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
-    """Steps from which one may go a share of the way: starts (ROWS, k) on the ``lane`` of each, of the length h."""
+class PartialSteps:
+    """Steps from which one may go a fraction of the way: starts (ROWS, k) on the ``member`` of each, the length h."""
 
     batch: Batch
     ends: Ends
-    lane: Indices
+    member: Indices
     state: Array
     h: Array
     event: Event
 
-    def to(self, which: Indices, share: Array) -> tuple[Array, Array]:
-        """States (ROWS, m) and events (m,) at shares (m,) of the steps ``which``."""
+    def to(self, which: Indices, fraction: Array) -> tuple[Array, Array]:
+        """States (ROWS, m) and events (m,) at fractions (m,) of the steps ``which``."""
         out, values = np.empty((ROWS, which.size)), np.empty(which.size)
-        for first in range(0, which.size, LANES):
-            part = slice(first, first + LANES)
+        for first in range(0, which.size, MEMBERS):
+            part = slice(first, first + MEMBERS)
             some = which[part]
-            local, edges, lane = self.batch.take(some), self.ends.take(some), self.lane[some]
+            local, edges, member = self.batch.take(some), self.ends.take(some), self.member[some]
             state = self.state[:, some]
             stages, seen = np.empty((13, ROWS, some.size)), np.empty((13, some.size))
             _in_tau(local.along(state), state, edges.turn, stages[0])
@@ -347,27 +344,27 @@ class Walk:
                 local,
                 edges,
                 state,
-                share[part] * self.h[some],
+                fraction[part] * self.h[some],
                 stages,
                 seen,
-                lambda at, lane=lane: self.event(at, lane),
+                lambda at, member=member: self.event(at, member),
             )
             values[part] = seen[12]
         return out, values
 
 
 def _closer(
-    walk: Walk, which: Indices, first: Array, last: Array
+    partial: PartialSteps, which: Indices, first: Array, last: Array
 ) -> Iterator[tuple[Indices, Array, Array, Array, Array]]:
-    """Brackets of zeros in steps that may hold several: between shares of them, and beside turns near zero."""
+    """Brackets of zeros in steps that may hold several: between fractions of them, and beside turns near zero."""
     if not which.size:
         return
-    shares = np.linspace(0.0, 1.0, _PARTS + 1)
+    fractions = np.linspace(0.0, 1.0, _PARTS + 1)
     values = np.empty((_PARTS + 1, which.size))
     values[0], values[-1] = first, last
     for i in range(1, _PARTS):
-        values[i] = walk.to(which, np.full(which.size, shares[i]))[1]
-    at = np.broadcast_to(shares[:, None], values.shape)
+        values[i] = partial.to(which, np.full(which.size, fractions[i]))[1]
+    at = np.broadcast_to(fractions[:, None], values.shape)
     # A parabola through three neighbours tells where a turn may pass zero; the value there is computed.
     for _ in range(3):
         left, middle, right = values[:-2], values[1:-1], values[2:]
@@ -384,7 +381,7 @@ def _closer(
         vertex = s1 - 0.5 * ((s1 - s0) * one - (s1 - s2) * two) / np.where(bottom == 0.0, 1.0, bottom)
         inside = turn.any(axis=0) & (bottom != 0.0) & (vertex > s0) & (vertex < s2) & (vertex != s1)
         vertex = np.where(inside, vertex, 0.5 * (s0 + s1))
-        there = walk.to(which, vertex)[1]
+        there = partial.to(which, vertex)[1]
         at, values = np.vstack([at, vertex]), np.vstack([values, there])
         order = np.argsort(at, axis=0, kind="stable")
         at, values = np.take_along_axis(at, order, 0), np.take_along_axis(values, order, 0)
@@ -392,12 +389,12 @@ def _closer(
     yield which[columns], at[rows, columns], at[rows + 1, columns], values[rows, columns], values[rows + 1, columns]
 
 
-def start(batch: Batch, temperature: Array, rate: Array, share: float) -> tuple[Array, Along]:
+def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tuple[Array, Along]:
     """States (ROWS, n) a little below the free surface, or at the interface, and the fields at the very surface."""
     if batch.surface_stress:
         state = _at_interface(batch, temperature)
         return state, batch.along(state)
-    p = share * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
+    p = fraction * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
     empty = Along(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
     return _series(batch, temperature, p, empty), empty
 

@@ -25,7 +25,7 @@ _DECIDES = 1e-9
 
 def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
     """The quantities ``names`` of the flows, (k,) each; kinds as their places among KINDS."""
-    of = batch.take(flows.lane)
+    of = batch.take(flows.member)
     plain = {
         "mass_flux": lambda: np.exp(flows.macroscopic[LOG_Q]),
         "centre_of_mass": lambda: np.exp(flows.macroscopic[LOG_H]),
@@ -37,7 +37,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
     }
     out: dict[str, Array] = {name: value() for name, value in plain.items() if name in names}
     rest = set(names) - set(plain)
-    if rest and flows.lane.size:
+    if rest and flows.member.size:
         inside = Inside(of, flows)
         further: dict[str, Callable[[], Array]] = {
             "largest_volume_fraction": lambda: inside.largest,
@@ -57,7 +57,7 @@ def _slip(at: Along) -> Array:
 
 
 class Inside:
-    """What happens between the surface and the base of flows, each on a lane of its own."""
+    """What happens between the surface and the base of flows, each on a member of its own."""
 
     def __init__(self, of: Batch, flows: Flows) -> None:
         self._of, self._flows = of, flows
@@ -67,15 +67,15 @@ class Inside:
         self._turns = self._march(lambda at, _: at.v - 1.0)
         first, base = np.exp(self._first[LOG_X]), of.along(flows.state).nu
         largest = np.maximum(first / (1.0 + first / of.law.densest), base)
-        lane, state = self._turns
-        if lane.size:
-            np.maximum.at(largest, lane, of.take(lane).along(state).nu)
+        member, state = self._turns
+        if member.size:
+            np.maximum.at(largest, member, of.take(member).along(state).nu)
         self.largest: Array = largest
 
     def _march(self, event: Callable[[Along, Indices], Array]) -> tuple[Indices, Array]:
         found = march(self._of, self._flows.temperature, self._ends, _ACCURACY, event)
-        above = found.state[LOG_P] < self._flows.state[LOG_P, found.lane]
-        return found.lane[above], found.state[:, above]
+        above = found.state[LOG_P] < self._flows.state[LOG_P, found.member]
+        return found.member[above], found.state[:, above]
 
     @property
     def inverted(self) -> Array:
@@ -90,10 +90,10 @@ class Inside:
         """Places among INTERIORS."""
         nets = [self._of.along(self._first).net, self._of.along(self._flows.state).net]
         size = np.maximum(np.abs(nets[0]), np.abs(nets[1]))
-        lane, _ = self._march(lambda at, _: at.net)
+        member, _ = self._march(lambda at, _: at.net)
         gains = (nets[0] < -_DECIDES * size) | (nets[1] < -_DECIDES * size)
         loses = (nets[0] > _DECIDES * size) | (nets[1] > _DECIDES * size)
-        gains[lane] = loses[lane] = True
+        gains[member] = loses[member] = True
         return np.where(gains & loses, 1.0, np.where(gains, 2.0, 0.0))
 
     @property
@@ -112,13 +112,13 @@ class Inside:
         base = self._flows.state[LOG_P]
         whole = march(self._of, self._flows.temperature, self._ends, _ACCURACY, lambda at, i: np.log(at.p) - base[i])
         bottom = np.full(len(self._of), np.nan)
-        bottom[whole.lane] = whole.state[HEIGHT]
+        bottom[whole.member] = whole.state[HEIGHT]
         out = bottom - self._first[HEIGHT]
-        lane, state = self._march(lambda at, lanes: np.log(at.nu) - target[lanes])
+        member, state = self._march(lambda at, members: np.log(at.nu) - target[members])
         # The first such place from the surface down; it is there unless the density begins above the target.
-        order = np.lexsort((-state[LOG_P], lane))
+        order = np.lexsort((-state[LOG_P], member))
         height = np.full(len(self._of), np.nan)
-        height[lane[order]] = state[HEIGHT, order]
+        height[member[order]] = state[HEIGHT, order]
         below = log_nu < target
         out[below] = (bottom - height)[below]
         if self._of.surface_stress == 0.0:

@@ -43,7 +43,7 @@ from chuteflow.trajectories.tables import (
 #: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden.
 S_L, S_Y, S_T, S_H, S_G = range(5)
 #: Kinds of invariant regions; in the first B > 0, in the others B < 0.
-FREE, HOT, LOW_FLUX, COLD = range(4)
+FREE, HOT, LOW_FLUX, COLD, BEYOND = range(5)
 #: Below this L nothing changes with the density, and distances count less.
 DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 #: States are no longer advanced where y is below this multiple of the scale of fluxes, or L above this.
@@ -181,6 +181,15 @@ def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
 
 
 @compiled
+def _region(bounds: Any, p: float, rows: Any, j: int, asked: tuple[float, float, float]) -> int:
+    """The region of a state; BEYOND where its flux by shear, which grows downwards, is larger than the first of what is
+    ``asked``, and ln T_surface between the others."""
+    if rows[j, S_G] > asked[0] and asked[1] < rows[j, S_T] < asked[2]:
+        return BEYOND
+    return region_of(bounds, p, rows[j, S_L], rows[j, S_Y])
+
+
+@compiled
 def _place(big_l: float) -> float:
     """L as distances count it."""
     return big_l if big_l > DILUTE else DILUTE + DILUTE_WEIGHT * (big_l - DILUTE)
@@ -303,8 +312,10 @@ def carry(
     per_flux: float,
     finest: float,
     most: int,
+    largest_flux: float,
 ) -> tuple[Any, ...]:
-    """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending.
+    """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending,
+    and no further than to where the flux by shear alone is larger than ``largest_flux``.
 
     Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
     where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row
@@ -338,6 +349,8 @@ def carry(
     lengths = np.empty((3, 3))
     theta[:n] = theta_s
     rows[:n, S_T] = log_t
+    # The outermost trajectories tell where branches lead out of the range.
+    asked = largest_flux, log_t[1], log_t[n - 2]
 
     for row in range(len(overburden)):
         over = overburden[row]
@@ -363,7 +376,7 @@ def carry(
                     frozen[j] = True
         # Where to insert; a cell is undecided where that is not enough.
         for j in range(n):
-            region[j] = COLD if frozen[j] else region_of(bounds, p, rows[j, S_L], rows[j, S_Y])
+            region[j] = COLD if frozen[j] else _region(bounds, p, rows, j, asked)
             residual[j] = rows[j, S_Y] - look_up(values, rows[j, S_L], BASE)
         for j in range(n - 1):
             length[j] = max(_distance(rows, j, per_flux), 1e-14)
@@ -430,7 +443,7 @@ def carry(
                     in_series[at] = in_series[j] and in_series[moved[j + 1]]
                     frozen[at] = False
                     open_[at] = True
-                    region[at] = region_of(bounds, p, inserted[k, S_L], inserted[k, S_Y])
+                    region[at] = _region(bounds, p, inserted, k, asked)
                     residual[at] = inserted[k, S_Y] - look_up(values, inserted[k, S_L], BASE)
                     came_from[total + at] = above[j] + t * (above[j + 1] - above[j])
                 at -= 1

@@ -191,13 +191,18 @@ class TrajectoryGrid:
 
 @lru_cache(maxsize=4)
 def carry_down(
-    model: Model, coldest: float, hottest: float, deepest: float, refinement: Refinement = REFINEMENT
+    model: Model,
+    coldest: float,
+    hottest: float,
+    deepest: float,
+    refinement: Refinement = REFINEMENT,
+    largest_flux: float = np.inf,
 ) -> TrajectoryGrid:
     """The grid of trajectories of ``model`` from surface temperatures ``coldest`` to ``hottest`` down to the hold-up
-    ``deepest``. Those of the last few chutes are remembered: one asks for other flows of the same chute next."""
-    return carry_down_for(
-        model, np.empty((ENTRIES, 0)), starts(coldest, hottest, refinement), deepest, refinement=refinement
-    )
+    ``deepest``; of flows with a flux above ``largest_flux`` it need not show all. Those of the last few chutes are
+    remembered: one asks for other flows of the same chute next."""
+    start = starts(coldest, hottest, refinement)
+    return carry_down_for(model, np.empty((ENTRIES, 0)), start, deepest, refinement, largest_flux)
 
 
 def starts(coldest: float, hottest: float, refinement: Refinement = REFINEMENT) -> Array:
@@ -207,11 +212,16 @@ def starts(coldest: float, hottest: float, refinement: Refinement = REFINEMENT) 
 
 
 def carry_down_for(
-    model: Model, others: Array, temperature: Array, deepest: float, refinement: Refinement = REFINEMENT
+    model: Model,
+    others: Array,
+    temperature: Array,
+    deepest: float,
+    refinement: Refinement = REFINEMENT,
+    largest_flux: float = np.inf,
 ) -> TrajectoryGrid:
     """The grid of trajectories from surface temperatures (C,), two or more, down to the hold-up ``deepest``, which
     serves the base of ``model``, ``others`` (entries, K) by their heat fluxes, and all between these; its zeros are of
-    the first."""
+    the first. Trajectories are followed to where their flux by shear is above ``largest_flux``."""
     t = tables(model)
     bounds, scale = t.bounds, t.scale
     if others.shape[1]:
@@ -223,7 +233,7 @@ def carry_down_for(
     states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
-        refinement.delta, 1.0 / scale, refinement.finest, refinement.most,
+        refinement.delta, 1.0 / scale, refinement.finest, refinement.most, largest_flux,
     )  # fmt: skip
     zeros, links = kernel.zeros_of(t.values, BASE, states, came_from, goes_on, first)
     return TrajectoryGrid(
