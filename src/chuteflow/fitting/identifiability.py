@@ -23,7 +23,9 @@ def trade_offs(estimates: Sequence[Estimate], correlation: Array) -> list[str]:
     for i, one in enumerate(estimates):
         for j in range(i + 1, len(estimates)):
             other, shared = estimates[j], float(correlation[i, j])
-            if np.isfinite(shared) and abs(shared) >= STRONG:
+            # What errors far beyond the range of a parameter go with says nothing.
+            sized = all(p.error < p.interval.high - p.interval.low for p in (one, other))
+            if sized and np.isfinite(shared) and abs(shared) >= STRONG:
                 step = np.sign(shared) * other.error
                 said.append(
                     f"{one.key} and {other.key} trade off: {number(one.error)} more of {one.key} goes with "

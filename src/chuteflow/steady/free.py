@@ -16,6 +16,8 @@ from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.bases import base
+from chuteflow.theory.constitutive import Law
+from chuteflow.theory.laws import law, settings_added
 
 #: Where a parameter may lie, and between which values it is looked for, by the last part of its name.
 _RANGES = {
@@ -88,7 +90,17 @@ class FreeParameter:
         where, _, name = self.key.partition(".")
         if where == "base":
             return {"base": replace(base(chute.base), **{name: value})}
-        return {"closure": chute.law.configured(**{name: value})}
+        return {"closure": _configured(chute.law, name, float(value))}
+
+
+def _configured(chosen: Law, name: str, value: float) -> Law:
+    """A law with another value of one parameter, each said once in the text by which it is asked for."""
+    text = str(chosen)
+    try:
+        known = law(text) == chosen
+    except InputError:
+        known = False
+    return law(settings_added(text, (f"{name}={value!r}",))) if known else chosen.configured(**{name: value})
 
 
 def varied(chute: Chute, free: Sequence[FreeParameter], values: Sequence[float]) -> Chute:

@@ -194,10 +194,8 @@ def _estimates(best: Fit) -> Iterator[str]:
     rows = [["", "estimate", "error", f"{best.confidence:.3g} interval", "", *("corr" for _ in best.free)]]
     rows[0][5:] = [f"corr {p.key}" for p in best.free]
     for one, shared in zip(best.estimates, best.correlation, strict=True):
-        if one.determined or not one.interval.open:
-            value, error = tables.number(one.value), tables.number(one.error)
-        else:
-            value, error = "not determined", ""
+        value = "not determined" if one.interval.open else tables.number(one.value)
+        error = tables.number(one.error) if one.determined else "-"
         ends = [tables.number(one.interval.low), tables.number(one.interval.high)]
         rows.append([one.key, value, error, *ends, *(f"{c:.3f}" if np.isfinite(c) else "-" for c in shared)])
     yield tables.table(rows, words=(0,))
