@@ -74,6 +74,12 @@ def test_a_fit_is_printed_saved_drawn_and_predicted_from(flow, tmp_path, capsys)
     assert known_all["flows"][0]["errors"]["M"] == 0.0
 
 
+def series(experiment, symbol):
+    found = experiment.profile(symbol)
+    assert found is not None
+    return found
+
+
 def test_units_are_read(flow, tmp_path):
     in_mm = {"height": 1e3, "velocity": 1e2, "mass_flux": 1.0}
 
@@ -89,7 +95,7 @@ def test_units_are_read(flow, tmp_path):
         ("T", profile.granular_temperature),
         ("u", profile.velocity),
     ):
-        np.testing.assert_allclose(one.profile(symbol).value, values, rtol=1e-12)
+        np.testing.assert_allclose(series(one, symbol).value, values, rtol=1e-12)
     assert one.exact["Q"] == pytest.approx(flow.mass_flux, rel=1e-12)
 
 
@@ -102,8 +108,8 @@ def test_experiments_parameters_errors_and_gaps_are_read(tmp_path):
         encoding="utf-8",
     )
     a, b = read_measurements(path).experiments
-    assert a.profile("nu").height.tolist() == [0.0, 2.0, 3.0]
-    assert a.profile("nu").error.tolist() == [0.05] * 3
+    assert series(a, "nu").height.tolist() == [0.0, 2.0, 3.0]
+    assert series(a, "nu").error.tolist() == [0.05] * 3
     assert (a.given["slope"], b.given["slope"]) == (0.3, 0.28)
     assert (a.exact, b.exact) == ({"Q": 3.0}, {"Q": 2.0})
     assert b.profiles == ()

@@ -58,6 +58,12 @@ def test_noise_is_covered_and_correlated(noisy):
     assert 1e-3 < noisy.probability < 1.0
 
 
+def followed(case, place, values, label):
+    found = case.followed(place, values, label)
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize("exact", [True, False])
 @pytest.mark.parametrize("relative", [True, False])
 def test_the_jacobian_is_that_of_differences(flow, exact, relative):
@@ -76,14 +82,14 @@ def test_the_jacobian_is_that_of_differences(flow, exact, relative):
         pair = []
         for sign in (1.0, -1.0):
             moved = VALUES + sign * step * np.eye(3)[j]
-            pair.append(case.residual(case.followed(place, moved, place.label), 0.05))
+            pair.append(case.residual(followed(case, place, moved, place.label), 0.05))
         change = (pair[0] - pair[1]) / (2.0 * step)
         np.testing.assert_allclose(linear.by_parameters[:, j], change, atol=1e-5 * np.abs(change).max())
     change = (case.residual(flow, 0.05 + step) - case.residual(flow, 0.05 - step)) / (2.0 * step)
     np.testing.assert_allclose(linear.by_base, change, atol=1e-6 * np.abs(change).max())
     assert objective.unknowns == 3 + 1 + (not exact)
     if not exact:
-        pair = [case.residual(case.followed(place, VALUES, place.label + s * step), 0.05) for s in (1.0, -1.0)]
+        pair = [case.residual(followed(case, place, VALUES, place.label + s * step), 0.05) for s in (1.0, -1.0)]
         change = (pair[0] - pair[1]) / (2.0 * step)
         np.testing.assert_allclose(linear.by_place, change, atol=1e-5 * np.abs(change).max())
 
@@ -169,6 +175,8 @@ def test_stresses_are_measured_without_a_model(flow):
         relative_errors=dict.fromkeys(("nu", "T", "u"), 0.01),
     )  # fmt: skip
     found = direct(data.experiments[0], TRUE)
+    assert found.g2 is not None
+    assert found.slip is not None
     inner = slice(2, -8)
     np.testing.assert_allclose(found.g1.value[inner], found.g1.law[inner], rtol=0.01)
     np.testing.assert_allclose(found.g2.value[inner], found.g2.law[inner], rtol=0.03)

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chuteflow import display
 from chuteflow.checks import number, real_array, shown
@@ -21,6 +21,8 @@ from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
+
+Mask = NDArray[np.bool_]
 
 #: Fields that can be measured over height, by symbol, and whether they must be positive.
 PROFILES = {"nu": ("volume_fraction", True), "T": ("granular_temperature", True), "u": ("velocity", False)}
@@ -228,7 +230,7 @@ def assembled(
     return found
 
 
-def _heights(what: str, z: Array, trust: tuple[float, float] | None) -> tuple[Array, Array]:
+def _heights(what: str, z: Array, trust: tuple[float, float] | None) -> tuple[Array, Mask]:
     """Heights, and which of them are to be used.
 
     Raises:
@@ -248,7 +250,7 @@ def _heights(what: str, z: Array, trust: tuple[float, float] | None) -> tuple[Ar
 def _series(
     what: str,
     symbol: str,
-    heights: tuple[Array, Array],
+    heights: tuple[Array, Mask],
     values: ArrayLike,
     errors: Errors | None,
     trust: Mapping[str, tuple[float, float]],

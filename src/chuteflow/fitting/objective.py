@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
@@ -108,9 +109,10 @@ class Objective:
             return Minimum(x, float(first @ first), np.empty((len(first), 0)), run.places, True)
         # Flows far from the measurements have derivatives that no longer mean anything.
         with np.errstate(all="ignore"):
-            found = least_squares(
+            found: Any = least_squares(
                 run.residual, x[moving], run.jacobian, bounds=(low[moving], high[moving]),
-                x_scale=self.scale()[moving], loss=self.loss, max_nfev=most, ftol=tolerance, xtol=tolerance, gtol=1e-12,
+                x_scale=self.scale()[moving], loss=cast(Any, self.loss), max_nfev=most,
+                ftol=tolerance, xtol=tolerance, gtol=1e-12,
             )  # fmt: skip
         whole = x.copy()
         whole[moving] = found.x

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -108,7 +109,7 @@ class Case:
         """All flows that could be meant where the free parameters have these values."""
         try:
             chute = self.at(values)
-            return [flow for asked in self._asked for flow in flows(chute, **asked, tolerance=_ROUGH)]
+            return [flow for asked in self._asked for flow in flows(chute, tolerance=_ROUGH, **cast(Any, asked))]
         except InputError:
             return []
 
@@ -193,8 +194,7 @@ class Case:
                 by_parameters.append((to_parameters * scale).T)
                 by_place.append(to_place * scale)
                 by_base.append(-steep[series.field] * scale)
-        if self.experiment.scalars:
-            along_all, across_all = answer.numbers_along
+        along_all, across_all = answer.numbers_along if self.experiment.scalars else ({}, {})
         for scalar in self.experiment.scalars:
             computed = np.array([getattr(place.flow, scalar.name)])
             scale = 1.0 / (scalar.error * (computed if scalar.relative else 1.0))

@@ -366,13 +366,13 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
         sides[-1, 1 + j] = -weights @ derivative(one.macroscopic())
     found = np.linalg.solve(np.concatenate([jacobian, (weights @ gradient)[None]]), sides)
     length = float(np.linalg.norm(gradient @ found[:, 0]))
-    ahead = found[:, 0] / length
+    ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
     across = np.empty((4, len(free)))
     moved = [_Moved.along(flow, problem.model, ahead)]
     for j, one in enumerate(beyond):
         rate = derivative(states[j].macroscopic()) + gradient @ found[:, 1 + j]
-        direction = found[:, 1 + j] - ahead * float(tangent @ rate)
+        direction: Array = found[:, 1 + j] - ahead * float(tangent @ rate)
         moved.append(_Moved.along(flow, one, direction))
         across[:, j] = moved[-1].place
     return Sensitivity(flow, free, condition, tangent, across, tuple(moved))
