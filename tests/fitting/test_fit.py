@@ -1,6 +1,7 @@
 """Calibration: parameters, intervals, what is left open, and predictions."""
 
 import os
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from chuteflow.fitting.measurements import measurements, together
 from chuteflow.fitting.objective import Objective
 from chuteflow.fitting.prediction import predict
 from chuteflow.fitting.residuals import Case, Place
+from chuteflow.fitting.sampling import sample
 from chuteflow.steady.free import chosen_parameters
 
 from .trials import FIRST, FREE, measured, trial
@@ -284,6 +286,25 @@ def test_what_is_known_is_not_free(flow):
     data = exact_profiles(flow, numbers={"Q": 3.0}, given={"e": 0.8})
     with pytest.raises(InputError, match="e is free, and experiment 1 gives it"):
         fit(data, FIRST, ["e"])
+
+
+def test_sampling_without_its_extra_says_what_to_install(noisy, monkeypatch):
+    monkeypatch.setitem(sys.modules, "emcee", None)
+    with pytest.raises(InputError, match=r"install chuteflow\[bayes\]"):
+        sample(noisy)
+
+
+@pytest.mark.slow
+def test_posterior_intervals_are_near_those_of_the_likelihood(noisy):
+    pytest.importorskip("emcee", reason="an extra of the package")
+    found = sample(noisy, steps=200)
+    for one in noisy.estimates:
+        low, high = found.interval(one.key)
+        width = one.interval.high - one.interval.low
+        assert abs(low - one.interval.low) < 0.2 * width
+        assert abs(high - one.interval.high) < 0.2 * width
+    with pytest.raises(InputError, match="choose from e, ew, roughness"):
+        found.interval("slope")
 
 
 #: Trials of each law; the whole campaign has 100.

@@ -364,7 +364,7 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     for j, one in enumerate(states):
         sides[:-1, 1 + j] = -derivative(one.residual())
         sides[-1, 1 + j] = -weights @ derivative(one.macroscopic())
-    found = np.linalg.solve(np.concatenate([jacobian, (weights @ gradient)[None]]), sides)
+    found: Any = np.linalg.solve(np.concatenate([jacobian, (weights @ gradient)[None]]), sides)
     length = float(np.linalg.norm(gradient @ found[:, 0]))
     ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
