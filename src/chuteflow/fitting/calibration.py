@@ -29,7 +29,7 @@ from chuteflow.threads import on_one_thread
 
 #: Evaluations in a first fit from each start, in a second one of those that may be the best, and in the last; and the
 #: tolerances of their sums of squares.
-_FIRST, _SECOND, _LAST = 5, 20, 60
+_FIRST, _SECOND, _LAST = 5, 12, 60
 _ROUGHLY, _CLOSELY = 1e-3, 1e-8
 #: Relative errors that are allowed of a number that is known exactly, to pass through a fold of it: on the way to a
 #: fit, and for intervals. A fold is near where its logarithm changes by less per arclength of the branch.
@@ -44,6 +44,8 @@ _MOST_TRIALS = 100_000
 _ROUNDS = 4
 #: Parameters of two fits that differ by less, in their errors, are the same; flows by less in ln Q, h, M and T.
 _SAME, _SAME_FLOW = 0.2, 0.3
+#: Minima are told of that are worse by so many times what the confidence allows at most.
+_MAY_FIT = 6.0
 #: Fits whose parameters differ by less, in their likely ranges, lead to the same minimum.
 _NEAR = 0.05
 
@@ -336,7 +338,7 @@ def _searched(objective: Objective, first: list[Array], trials: int | None) -> t
     kept: list[Minimum] = []
     for one in found:
         hopeless = kept and one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
-        if hopeless or any(_near(objective, one, other) for other in kept):
+        if hopeless or any(_near(objective, one, other) or objective.leads_to(one, other) for other in kept):
             continue
         kept.append(objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one)
         kept.sort(key=lambda one: one.chi2)
@@ -507,7 +509,7 @@ def _outcome(
         loss=objective.loss,
         confidence=confidence,
         experiments=tuple(experiments),
-        alternatives=tuple(_alternatives(objective, best, others, error, rise)),
+        alternatives=tuple(_alternatives(objective, best, others, error, rise, intervals)),
         converged=best.converged,
     )
 
@@ -535,21 +537,33 @@ def _rank(case: Case, place: Place) -> tuple[int, int]:
 
 
 def _alternatives(
-    objective: Objective, best: Minimum, others: Sequence[Minimum], error: Array, rise: float
+    objective: Objective,
+    best: Minimum,
+    others: Sequence[Minimum],
+    error: Array,
+    rise: float,
+    intervals: Sequence[Interval],
 ) -> list[Alternative]:
-    """Minima that differ from the best one and from one another; what may fit as well is followed to the end."""
+    """Minima that differ from the best one and from one another; what may fit as well is followed further."""
     found: list[Alternative] = []
     kept = [best]
     k = objective.parameters
     for one in sorted(others, key=lambda m: m.chi2):
-        if one.chi2 > best.chi2 + 4.0 * rise + 0.5 * best.chi2:
+        if one.chi2 > best.chi2 + _MAY_FIT * rise:
             continue
-        if any(_same(objective, one, other, error) for other in kept):
+        if any(_same(objective, one, other, error) or objective.leads_to(one, other) for other in kept):
             continue
-        ended = objective.minimise(one.x.copy(), one.places, most=_LAST, tolerance=1e-6) or one
+        ended = one
+        if not one.converged:
+            ended = objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one
         if any(_same(objective, ended, other, error) for other in kept):
             continue
         kept.append(ended)
+        # What the intervals hold already is no other answer.
+        if _same_flows(ended, best) and all(
+            inside.low <= value <= inside.high for inside, value in zip(intervals, ended.x[:k], strict=True)
+        ):
+            continue
         found.append(
             Alternative(
                 ended.x[:k].copy(),

@@ -17,15 +17,19 @@ LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 _PLACE_SCALE, _BASE_SCALE = 0.3, 0.3
 #: A residual beyond this is that of a flow where there is none.
 _LARGEST = 1e6
+#: A fit is on its way to another where its derivatives put it there with a sum of squares larger by this part, and its
+#: flow within this distance in ln Q, ln h, ln M and ln T.
+_WORSE, _ELSEWHERE = 0.25, 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a minimisation ended: unknowns ``x``, the sum of squares ``chi2``, the Jacobian ``jacobian`` (n, p) of the
-    residuals (of their loss), the flow of each experiment, and whether it ``converged``."""
+    """Where a minimisation ended: unknowns ``x``, the sum of squares ``chi2``, the residuals (n,), their ``jacobian``
+    (n, p) (of their loss), the flow of each experiment, and whether it ``converged``."""
 
     x: Array
     chi2: float
+    residual: Array
     jacobian: Array
     places: tuple[Place, ...]
     converged: bool
@@ -106,7 +110,7 @@ class Objective:
         if not np.isfinite(first).all():
             return None
         if not moving:
-            return Minimum(x, float(first @ first), np.empty((len(first), 0)), run.places, True)
+            return Minimum(x, float(first @ first), first, np.empty((len(first), 0)), run.places, True)
         # Flows far from the measurements have derivatives that no longer mean anything.
         with np.errstate(all="ignore"):
             found: Any = least_squares(
@@ -116,10 +120,27 @@ class Objective:
             )  # fmt: skip
         whole = x.copy()
         whole[moving] = found.x
-        run.residual(found.x)
+        residual = run.residual(found.x)
         jacobian = np.zeros((len(first), self.unknowns))
         jacobian[:, moving] = found.jac
-        return Minimum(whole, 2.0 * float(found.cost), jacobian, run.accepted(found.x), found.status > 0)
+        converged = found.status > 0
+        return Minimum(whole, 2.0 * float(found.cost), residual, jacobian, run.accepted(found.x), converged)
+
+    def leads_to(self, one: Minimum, best: Minimum) -> bool:
+        """Whether a fit that has not ended is on its way to ``best``: by its derivatives, that is where its flows go
+        and how well they fit there."""
+        predicted = one.residual + one.jacobian @ (best.x - one.x)
+        if float(predicted @ predicted) > best.chi2 + _WORSE * (best.chi2 + self.count):
+            return False
+        for i, (place, there) in enumerate(zip(one.places, best.places, strict=True)):
+            column = self.label_column(i)
+            label = place.label if column is None else float(best.x[column])
+            if column is not None and place.weights != there.weights:
+                label = float(np.array(place.weights) @ there.flow.solution.macroscopic)
+            off = place.expected_place(best.x[: self.parameters], label) - there.flow.solution.macroscopic
+            if float(np.abs(off).max()) > _ELSEWHERE:
+                return False
+        return True
 
 
 @dataclass(eq=False)

@@ -253,8 +253,13 @@ class Place:
         """How far the flow moves in m, as far as is known."""
         if "answer" not in self.__dict__:
             return 0.5
+        return float(np.linalg.norm(self.expected_place(values, label) - self.flow.solution.macroscopic))
+
+    def expected_place(self, values: Array, label: float) -> Array:
+        """ln Q, ln h, ln M and ln T_surface (4,) at other values and another label, by the derivatives here."""
         by_parameters, by_label = self.held(self.answer.tangent, self.answer.across.T)
-        return float(np.linalg.norm((values - self.values) @ by_parameters + by_label * (label - self.label)))
+        moved = (values - self.values) @ by_parameters + by_label * (label - self.label)
+        return self.flow.solution.macroscopic + moved
 
 
 def _inside(flow: Flow, z: Array) -> Array:
