@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -305,6 +306,29 @@ def test_posterior_intervals_are_near_those_of_the_likelihood(noisy):
         assert abs(high - one.interval.high) < 0.2 * width
     with pytest.raises(InputError, match="choose from e, ew, roughness"):
         found.interval("slope")
+
+
+@pytest.mark.slow
+def test_fits_take_seconds(flow):
+    # Processor time: the machine may be busy.
+    data = measured(flow, np.random.default_rng(3))
+    start = time.process_time()
+    fit(data, FIRST, FREE)
+    assert time.process_time() - start < 2.0
+    rng = np.random.default_rng(11)
+    true = Chute(0.3, 0.85, 0.75, 0.62, closure="lun:friction=0.05")
+    parts = []
+    for i, (slope, flux) in enumerate(
+        [(0.27, 1.5), (0.28, 2), (0.29, 3), (0.3, 2), (0.3, 4), (0.31, 3), (0.31, 5), (0.32, 4), (0.33, 3), (0.33, 6)]
+    ):
+        one = [f for f in flows(replace(true, slope=slope), Q=flux) if f.largest_volume_fraction < 0.58][-1]
+        parts.append(measured(one, rng, points=15, given={"slope": slope}, name=str(i)))
+    chute = replace(true, restitution=0.75, wall_restitution=0.7, roughness=0.6)
+    start = time.process_time()
+    found = fit(together(parts), chute, [*FREE, "closure.packing", "closure.friction"])
+    assert time.process_time() - start < 20.0
+    for one, value in zip(found.estimates, (0.85, 0.75, 0.62, 0.62, 0.05), strict=True):
+        assert one.value == pytest.approx(value, abs=4.0 * one.error)
 
 
 #: Trials of each law; the whole campaign has 100.
