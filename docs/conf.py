@@ -24,6 +24,7 @@ extensions = [
     "commands",
     "tables",
     "pictures",
+    "notebook",
     "convergence",
     "profiles",
     "present",

@@ -1,10 +1,12 @@
-"""Runs the examples of a Markdown page in order, as a reader would: python run_page.py PAGE, in an empty folder.
+"""Runs the examples of a Markdown page or notebook in order, as a reader would: python run_page.py PAGE, in an empty
+folder.
 
 Python blocks share one set of names, and ``sh`` blocks hold command lines of chuteflow alone. A line may end in the
 comment "# exit code N". What a block writes is compared with the ``output`` block after it, if there is one: numbers
 to their last digit, estimated errors to their order of magnitude; a line "..." stands for any lines.
 """
 
+import json
 import re
 import shlex
 import sys
@@ -39,6 +41,19 @@ def examples(text: str) -> Iterator[Example]:
         if block is not None and block[1] in ("python", "sh"):
             shown = after[2] if after is not None and after[1] == "output" else None
             yield Example(text.count("\n", 0, block.start()) + 1, block[1], block[2], shown)
+
+
+def cells(text: str) -> Iterator[Example]:
+    """The code cells of a notebook, as examples."""
+    for number, cell in enumerate(json.loads(text)["cells"]):
+        if cell["cell_type"] == "code":
+            yield Example(number, "python", "".join(cell["source"]), None)
+
+
+def blocks_of(page: Path) -> Iterator[Example]:
+    """The examples of a page or notebook."""
+    text = page.read_text(encoding="utf-8")
+    return cells(text) if page.suffix == ".ipynb" else examples(text)
 
 
 def run(example: Example, names: dict[str, object], page: str) -> str:
@@ -101,7 +116,7 @@ def main(page: Path) -> None:
     """Run the page, and end with a message where an example fails or writes something else."""
     names: dict[str, object] = {"__name__": "__main__"}  # as a script that a reader runs
     sys.path.insert(0, str(Path.cwd()))
-    for example in examples(page.read_text(encoding="utf-8")):
+    for example in blocks_of(page):
         written = run(example, names, str(page))
         if example.output is not None and not agree(example.output, written):
             raise SystemExit(f"{page}, line {example.line}: the page shows\n{example.output}\nwritten was\n{written}")

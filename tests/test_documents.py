@@ -11,10 +11,11 @@ import pytest
 
 from chuteflow.cli.program import main
 
-from .run_page import agree, examples
+from .run_page import agree, blocks_of, examples
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
+NOTEBOOKS = sorted(DOCS.rglob("*.ipynb"))
 PAGES = [ROOT / "README.md", *sorted(path for path in DOCS.rglob("*.md"))]
 RUNNER = Path(__file__).with_name("run_page.py")
 
@@ -23,7 +24,7 @@ def name(page):
     return str(page.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if any(examples(p.read_text(encoding="utf-8")))], ids=name)
+@pytest.mark.parametrize("page", [p for p in (*PAGES, *NOTEBOOKS) if any(blocks_of(p))], ids=name)
 def test_examples(page, tmp_path):
     for file in page.parent.glob("*.py"):  # what the page tells to save
         if page.is_relative_to(DOCS) and file.parent != DOCS:

@@ -71,12 +71,14 @@ class Layer(_Generated):
 
     def lines(self) -> Iterator[str]:
         """One section for each module."""
-        left_out = ", ".join(public_names())
+        names = public_names()
         layer = self.arguments[0]
         yield from (import_module(f"chuteflow.{layer}").__doc__ or "", "")
         chosen = [f"chuteflow.{layer}.{name}" for name in self.content] or modules_of(layer)
         for name in chosen:
             title = name.removeprefix("chuteflow.")
+            module = import_module(name)
+            left_out = ", ".join(n for n in names if getattr(module, n, None) is getattr(chuteflow, n))
             yield from (title, "-" * len(title), "")
             yield f".. automodule:: {name}"
             yield "   :members:"

@@ -9,21 +9,30 @@ if TYPE_CHECKING:
     from chuteflow.bifurcations.boundary import Boundary, BoundarySet, Turning, boundary
     from chuteflow.branches.curve import curve
     from chuteflow.branches.enumeration import flows
-    from chuteflow.branches.results import Branch, Curve, FlowSet, Searched, SpecialPoint
+    from chuteflow.branches.nearest import Nearest, nearest
+    from chuteflow.branches.results import Branch, Curve, FlowSet, FlowSets, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
     from chuteflow.fitting.calibration import Fit, fit
     from chuteflow.fitting.comparison import compare
     from chuteflow.fitting.design import design
     from chuteflow.fitting.measurements import Measurements, measurements, together
     from chuteflow.fitting.prediction import predict
+    from chuteflow.io.chute_file import read_chute
     from chuteflow.io.files import load, save
     from chuteflow.io.measurements_file import read_measurements
     from chuteflow.maps.domain import Domain, domain
+    from chuteflow.stability.disturbed import growth, neutral, relax
+    from chuteflow.stability.planes import FamilyMap, WaveMap
+    from chuteflow.stability.relaxation import Relaxation
     from chuteflow.stability.verdict import Stability, stability_of
+    from chuteflow.steady.cases import Case, case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.hot import HotModel, hot
     from chuteflow.steady.quantities import QUANTITIES, Quantity, Scales
+    from chuteflow.sweeps.scan import Scan, scan
+    from chuteflow.sweeps.sweep import sweep
+    from chuteflow.theory.laws import closures
 
 __version__ = "0.1.0"
 
@@ -32,25 +41,29 @@ _HOMES = {
     "Boundary": "bifurcations.boundary",
     "BoundarySet": "bifurcations.boundary",
     "Branch": "branches.results",
+    "Case": "steady.cases",
     "Chute": "steady.chute",
     "ChuteflowError": "errors",
     "Curve": "branches.results",
     "Domain": "maps.domain",
+    "FamilyMap": "stability.planes",
     "Flow": "steady.flow",
     "FlowSet": "branches.results",
+    "FlowSets": "branches.results",
+    "HotModel": "steady.hot",
     "InputError": "errors",
+    "Nearest": "branches.nearest",
     "Profile": "steady.flow",
     "QUANTITIES": "steady.quantities",
     "Quantity": "steady.quantities",
+    "Relaxation": "stability.relaxation",
     "Scales": "steady.quantities",
+    "Scan": "sweeps.scan",
     "Searched": "branches.results",
     "SolveError": "errors",
     "SpecialPoint": "branches.results",
-    "Turning": "bifurcations.boundary",
-    "boundary": "bifurcations.boundary",
     "Stability": "stability.verdict",
     "Fit": "fitting.calibration",
-    "HotModel": "steady.hot",
     "Measurements": "fitting.measurements",
     "compare": "fitting.comparison",
     "design": "fitting.design",
@@ -59,13 +72,25 @@ _HOMES = {
     "predict": "fitting.prediction",
     "read_measurements": "io.measurements_file",
     "together": "fitting.measurements",
+    "Turning": "bifurcations.boundary",
+    "WaveMap": "stability.planes",
+    "boundary": "bifurcations.boundary",
+    "case": "steady.cases",
+    "closures": "theory.laws",
     "curve": "branches.curve",
     "domain": "maps.domain",
     "flows": "branches.enumeration",
+    "growth": "stability.disturbed",
     "hot": "steady.hot",
     "load": "io.files",
+    "nearest": "branches.nearest",
+    "neutral": "stability.disturbed",
+    "read_chute": "io.chute_file",
+    "relax": "stability.disturbed",
     "save": "io.files",
+    "scan": "sweeps.scan",
     "stability_of": "stability.verdict",
+    "sweep": "sweeps.sweep",
 }
 
 __all__ = [
@@ -73,39 +98,55 @@ __all__ = [
     "Boundary",
     "BoundarySet",
     "Branch",
+    "Case",
     "Chute",
     "ChuteflowError",
     "Curve",
     "Domain",
+    "FamilyMap",
     "Fit",
     "Flow",
     "FlowSet",
+    "FlowSets",
     "HotModel",
     "InputError",
     "Measurements",
+    "Nearest",
     "Profile",
     "Quantity",
+    "Relaxation",
     "Scales",
+    "Scan",
     "Searched",
     "SolveError",
     "SpecialPoint",
     "Stability",
     "Turning",
+    "WaveMap",
     "__version__",
     "boundary",
+    "case",
+    "closures",
     "compare",
     "curve",
     "design",
     "domain",
     "fit",
     "flows",
+    "growth",
     "hot",
     "load",
     "measurements",
+    "nearest",
+    "neutral",
     "predict",
+    "read_chute",
     "read_measurements",
+    "relax",
     "save",
+    "scan",
     "stability_of",
+    "sweep",
     "together",
 ]
 

@@ -232,5 +232,7 @@ def test_trajectories_need_not_be_followed_to_larger_fluxes(chute, flux):
     assert len(found) == len(every) > 0
     for one, other in zip(found, every, strict=True):
         assert one.mass_holdup == pytest.approx(other.mass_holdup, rel=1e-9)
+    assert every.searched.cells is not None
+    assert found.searched.cells is not None
     if every.searched.cells.number > 20_000:
         assert found.searched.cells.number < every.searched.cells.number / 2

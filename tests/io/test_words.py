@@ -52,11 +52,12 @@ def test_names_of_the_flows_of_many_chutes_do_not_contradict_their_numbers():
 
 def test_notes_explain_what_the_table_shows():
     found = flows(PAPER, Q=3.0)
-    depth, *others = words.notes(found)
+    depth, speeds, *others = words.notes(found)
+    assert speeds.startswith("U: Q/M; Fr: ")
     assert depth.startswith("depth: the height above which nu is below 1 % of nu_max")
     assert [note.split(":")[0] for note in others] == ["large slip", "rarefied"]
     (dense,) = flows(PAPER, T_surface=0.01)
-    assert [note.split(":")[0] for note in words.notes([dense])[1:]] == ["dense", "large slip"]
+    assert [note.split(":")[0] for note in words.notes([dense])[2:]] == ["dense", "large slip"]
 
 
 def test_the_stretches_of_a_curve_have_their_validity():

@@ -273,3 +273,20 @@ def test_why_there_is_no_flow():
     assert reason_at(0.05, 0.8, 0.8, 0.6) == Reason.BASE_AND_INTERIOR_LOSE_ENERGY
     assert reason_at(1.5, 0.9, 0.9, 0.6) == Reason.BASE_AND_INTERIOR_GAIN_ENERGY
     assert reason_at(0.43, 0.8, 0.8, 0.6) == Reason.TOO_STEEP_FOR_HOT_FLOWS_NO_OTHER_FOUND
+
+
+def test_the_numbers_that_follow_from_others_are_those_of_the_flows():
+    names = ["mean_velocity", "froude_number", "angle"]
+    table = {
+        "parameters": {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "Q": 3.0},
+        "results": {"quantities": names},
+    }
+    side_by_side = solve_chunk(from_dict(table, Path()), 0).quantities
+    table["results"] = {"quantities": [*names, "surface_velocity", "mean_volume_fraction"]}
+    singly = solve_chunk(from_dict(table, Path()), 0).quantities
+    found = flows(Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)
+    for name, values in singly.items():
+        wanted = [getattr(flow, name) for flow in found]
+        np.testing.assert_allclose(values[0, :3], wanted, rtol=1e-7)
+        if name in side_by_side:
+            np.testing.assert_allclose(side_by_side[name][0, :3], wanted, rtol=1e-6)

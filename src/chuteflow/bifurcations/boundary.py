@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
+from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.kinks import crossings
@@ -40,7 +41,7 @@ _ASIDE = (0.0, 0.07, -0.11)
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
+class Turning(Compared):
     """A turning point of a boundary in its second parameter: ``kind`` is one of TURNS, ``flow`` the flow there,
     ``error`` the estimated relative error, ``position`` the index of the point of the boundary before it."""
 
@@ -54,7 +55,7 @@ class Turning:
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary(LineOfFlows):
+class Boundary(Result, LineOfFlows):
     """Flows of one kind of special point, in order as the ``second`` parameter of their chutes varies.
 
     ``error`` (k,) are the estimated relative errors, the largest of Q, h, M and the parameter; ``special`` are
@@ -67,7 +68,7 @@ class Boundary(LineOfFlows):
     error: Array
     special: tuple[Turning, ...]
     ends: tuple[str, str]
-    traced: TracedBoundary = field(repr=False)
+    traced: TracedBoundary = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
         turns = display.counted(len(self.special), "turning point")
@@ -101,7 +102,7 @@ class Boundary(LineOfFlows):
 
 
 @dataclass(frozen=True, eq=False)
-class BoundarySet(Sequence[Boundary]):
+class BoundarySet(Result, Sequence[Boundary]):
     """Every boundary that was found, the longest first.
 
     ``chute`` gives the other parameters; ``bounds`` is the range of the ``second``, ``sampled`` the values of it at
@@ -120,11 +121,25 @@ class BoundarySet(Sequence[Boundary]):
     bounds: tuple[float, float]
     boundaries: tuple[Boundary, ...]
     sampled: tuple[float, ...]
-    families: tuple[tuple[TracedFamily, ...], ...] = field(repr=False)
+    families: tuple[tuple[TracedFamily, ...], ...] = field(repr=False, compare=False)
     skipped: tuple[float, ...]
     searched: Searched
     tolerance: float
     reason: str | None
+
+    def plot(self, *, scales: Any = None, **options: Any) -> Any:
+        """Draw the boundaries over the second parameter and a ``quantity``, one of those that place a flow on a curve;
+        the mass flux by default.
+
+        Returns matplotlib's axes; see :meth:`chuteflow.result.Result.plot`.
+        """
+        from chuteflow.bifurcations.diagram import diagram
+
+        quantity = options.pop("quantity", "mass_flux")
+        if quantity not in PLACE:
+            raise InputError(f"quantity = {quantity!r}: choose one of {', '.join(PLACE)}")
+        shown = diagram(self, quantity) if len(self) else self
+        return from_above("plotting.axes", "plot")(shown, scales=scales, **options)
 
     @cached_property
     def incomplete(self) -> str | None:

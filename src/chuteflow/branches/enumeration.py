@@ -6,16 +6,17 @@ that meet the condition are where the quantity takes its value (:mod:`chuteflow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
 from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
 from chuteflow.branches.ranges import Range
-from chuteflow.branches.results import FlowSet
-from chuteflow.checks import number
+from chuteflow.branches.results import FlowSet, FlowSets
+from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST
@@ -27,6 +28,9 @@ from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 from chuteflow.threads import on_one_thread
 from chuteflow.trajectories.refining import TrajectoryGrid
 
+#: Several values of a quantity.
+Values: TypeAlias = Sequence[float] | Array
+
 _EXTENSIONS = 4
 #: A family leads out of the range towards a value if the quantity rises at least with this power there.
 _LEADS = 0.25
@@ -36,12 +40,12 @@ _MOST_DEEPER = 4
 _SAME = 1e-9
 #: The range reaches this factor beyond a flow that was found just outside.
 _ASIDE = 1.2
-_QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
+#: Places of the conditions among ln Q, ln h, ln M and ln T_surface.
+QUANTITIES = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 
 
-@on_one_thread
-@np.errstate(under="ignore")
-def flows(
+@overload
+def flows(  # pyright: ignore[reportOverlappingOverload]
     chute: Chute,
     *,
     Q: float | None = None,
@@ -51,8 +55,33 @@ def flows(
     tolerance: float = TOLERANCE,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
-) -> FlowSet:
+) -> FlowSet: ...
+@overload
+def flows(
+    chute: Chute,
+    *,
+    Q: Values | None = None,
+    M: Values | None = None,
+    h: Values | None = None,
+    T_surface: Values | None = None,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> FlowSets: ...
+def flows(
+    chute: Chute,
+    *,
+    Q: float | Values | None = None,
+    M: float | Values | None = None,
+    h: float | Values | None = None,
+    T_surface: float | Values | None = None,
+    tolerance: float = TOLERANCE,
+    surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
+    largest_holdup: float = LARGEST_HOLDUP,
+) -> FlowSet | FlowSets:
     """Every steady flow on ``chute`` with one given quantity, from hot to cold.
+
+    An array of values of the quantity gives the flows at each of them.
 
     Args:
         chute: the chute.
@@ -68,10 +97,21 @@ def flows(
     Raises:
         InputError: for none or several of Q, M, h and T_surface, or a value out of range.
     """
-    condition = _asked({"Q": Q, "M": M, "h": h, "T_surface": T_surface})
-    return flows_within(chute, *condition, tolerance, surface_temperature, largest_holdup)
+    given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
+    named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
+    search = tolerance, surface_temperature, largest_holdup
+    if not named or np.ndim(named[0][1]) == 0:
+        return flows_within(chute, *asked(given), *search)
+    name, several = named[0]
+    values = real_array(name, several)
+    if values.ndim > 1:
+        raise InputError(f"{name}: must be a number or a one-dimensional array of some")
+    each = [{**given, name: value} for value in values.tolist()]
+    sets = tuple(flows_within(chute, *asked(one), *search) for one in each)
+    return FlowSets(chute, name, tuple(values.tolist()), sets)
 
 
+@on_one_thread
 @np.errstate(under="ignore")
 def flows_within(
     chute: Chute,
@@ -136,14 +176,19 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
     return _Search(within, found, inside, beyond, lost, search(problem, within))
 
 
-def _asked(given: dict[str, float | None]) -> tuple[int, float]:
+def asked(given: Mapping[str, Any]) -> tuple[int, float]:
+    """The place of the one quantity that is given among the macroscopic ones, and its value.
+
+    Raises:
+        InputError: for none or several, or a value out of range.
+    """
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) != 1:
         what = ", ".join(named) if named else "none"
         raise InputError(f"give exactly one of Q, M, h and T_surface: got {what}")
     ((name, raw),) = named.items()
     low, high = {"T_surface": WIDEST, "M": (1e-12, DEEPEST)}.get(name, (1e-12, 1e12))
-    return _QUANTITIES[name], number(name, raw, low, high)
+    return QUANTITIES[name], number(name, raw, low, high)
 
 
 @dataclass(frozen=True)

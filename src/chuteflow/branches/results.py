@@ -11,6 +11,7 @@ import numpy as np
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.result import Compared, Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, PLACE
@@ -37,7 +38,7 @@ class Searched:
 
 
 @dataclass(frozen=True, eq=False)
-class FlowSet(Sequence[Flow]):
+class FlowSet(Result, Sequence[Flow]):
     """The flows found in the range searched, from hot to cold (by surface temperature, then by hold-up).
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
@@ -84,7 +85,41 @@ class FlowSet(Sequence[Flow]):
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialPoint:
+class FlowSets(Result, Sequence[FlowSet]):
+    """The flows of one chute at each of several ``values`` of a ``quantity`` ("Q", "M", "h" or "T_surface")."""
+
+    chute: Chute
+    quantity: str
+    values: tuple[float, ...]
+    sets: tuple[FlowSet, ...]
+
+    def __repr__(self) -> str:
+        values = f"{self.quantity} = {display.listed(self.values)}"
+        numbers = ", ".join(str(len(one)) for one in self.sets[:20]) + (", ..." if len(self.sets) > 20 else "")
+        return display.line("FlowSets", values, f"{numbers} flows")
+
+    def _repr_html_(self) -> str:
+        header = [self.quantity, "name", *(NUMBERS[name].symbol for name in PLACE), "density", "interior", "error"]
+        rows = [
+            [display.number(value), flow.name, *_place(flow), flow.density, flow.interior, f"{flow.error:.0e}"]
+            for value, one in zip(self.values, self.sets, strict=True)
+            for flow in one
+        ]
+        return display.html_table(repr(self)[1:-1], header, rows)
+
+    def __len__(self) -> int:
+        return len(self.sets)
+
+    @overload
+    def __getitem__(self, index: int) -> FlowSet: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[FlowSet]: ...
+    def __getitem__(self, index: int | slice) -> FlowSet | Sequence[FlowSet]:
+        return self.sets[index]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint(Compared):
     """A located point of a branch: ``kind`` is one of KINDS, ``position`` the index just before it."""
 
     kind: str
@@ -134,7 +169,7 @@ class LineOfFlows:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(LineOfFlows):
+class Branch(Result, LineOfFlows):
     """One family of flows in order along its curve; ``ends`` says in words why it ends at either side."""
 
     flows: tuple[Flow, ...]
@@ -151,7 +186,7 @@ class Branch(LineOfFlows):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Result):
     """All families of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
     where there may be more: where a family was seen and not solved, or the search does not tell."""
 
@@ -161,6 +196,33 @@ class Curve:
     tolerance: float
     reason: str | None
     incomplete: str | None = None
+
+    def at(
+        self,
+        *,
+        Q: float | None = None,
+        M: float | None = None,
+        h: float | None = None,
+        T_surface: float | None = None,
+    ) -> FlowSet:
+        """Every flow of the chute with one given quantity, as :func:`chuteflow.flows` finds them in the range and to
+        the tolerance of this curve.
+
+        Raises:
+            InputError: for none or several of Q, M, h and T_surface, or a value out of range.
+        """
+        from chuteflow.branches.enumeration import flows
+
+        return flows(
+            self.chute,
+            Q=Q,
+            M=M,
+            h=h,
+            T_surface=T_surface,
+            tolerance=self.tolerance,
+            surface_temperature=self.searched.surface_temperature,
+            largest_holdup=self.searched.largest_holdup,
+        )
 
     def __repr__(self) -> str:
         families = display.counted(len(self.branches), "family", "families")

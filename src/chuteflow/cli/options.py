@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -14,7 +17,8 @@ from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEM
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.branches.results import FlowSet
+    from chuteflow.branches.results import Curve, FlowSet, Searched
+    from chuteflow.steady.cases import Case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
@@ -26,7 +30,25 @@ SAVED, DRAWN = (".nc", ".csv", ".json"), (".png", ".pdf", ".svg")
 
 #: The conditions by their options.
 _CONDITIONS = {condition.option: condition for condition in CONDITIONS.values()}
-_SCALES = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
+#: The case, or file of a chute, that holds where neither --chute nor --case is given.
+CASE_VARIABLE = "CHUTEFLOW_CASE"
+#: Numbers with colons or commas between, and the unit after them.
+_NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_BEFORE_UNIT = re.compile(rf"\s*({_NUMBER}(?:[:,]{_NUMBER})*)\s*((?:1\s*/\s*)?[^\W\d_].*?)\s*")
+#: Slopes from here on, and angles below, are taken for a mistake: tan(theta) and degrees were confused.
+_STEEPEST, _FLATTEST = 3.0, 1.0
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """Numbers with a ``unit`` after them, as they were typed."""
+
+    texts: tuple[str, ...]
+    unit: str
+    separator: str = ":"
+
+    def __str__(self) -> str:
+        return f"{self.separator.join(self.texts)} {self.unit}"
 
 
 class Number(click.ParamType):
@@ -43,17 +65,41 @@ class Number(click.ParamType):
 
 
 class Interval(click.ParamType):
-    """Two numbers as LO:HI."""
+    """Two numbers as LO:HI; with a unit after them where ``units`` are taken, then as typed."""
 
     name = "lo:hi"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+    def __init__(self, *, units: bool = False) -> None:
+        self._units = units
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float] | Amounts:
         """Both ends."""
+        ends, unit = without_unit(value) if self._units else (value, "")
         try:
-            low, high = map(float, value.split(":"))
+            low, high = map(float, ends.split(":"))
         except ValueError:
             self.fail(f"{value!r} is not a range: write two numbers as LO:HI, for example 0.01:500", param, ctx)
-        return low, high
+        return Amounts(tuple(ends.split(":")), unit) if unit else (low, high)
+
+
+class NumberInUnits(click.ParamType):
+    """A number; with a unit after it as typed."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | Amounts:
+        """The number."""
+        text, unit = without_unit(str(value))
+        number = Number().convert(text if unit else value, param, ctx)
+        return Amounts((text,), unit) if unit else number
+
+
+def without_unit(text: str) -> tuple[str, str]:
+    """Numbers and the unit after them, which may be empty."""
+    parts = _BEFORE_UNIT.fullmatch(text)
+    return (parts[1], parts[2]) if parts else (text, "")
 
 
 class NumberOrInterval(click.ParamType):
@@ -61,9 +107,7 @@ class NumberOrInterval(click.ParamType):
 
     name = "number"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float | tuple[float, float]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The number, or both ends."""
         kind = Interval() if ":" in str(value) else Number()
         return kind.convert(value, param, ctx)
@@ -94,19 +138,74 @@ def _opening(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def range_options(slope: str) -> Callable[[Command], Command]:
-    """Options of the parameters of a chute where some of them take a range; ``slope`` says which."""
-    return _options(
-        option("--slope", type=NumberOrInterval(), help=f"Slope tan(theta) of the chute; LO:HI {slope}."),
-        option("--angle", type=Number(), help="Inclination theta in degrees, instead of --slope."),
-        *(
-            option(f"--{key}", type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
-            for key, parameter in BY_KEY.items()
-            if key != "slope"
-        ),
-    )
+def _described(command: Command) -> Command:
+    """``command`` with what the chute's file or case says in the place of options that are not given."""
+
+    @wraps(command)
+    def described(**given: Any) -> Any:
+        return command(**_filled(given))
+
+    return described  # pyright: ignore[reportReturnType]
 
 
+def _filled(given: dict[str, Any]) -> dict[str, Any]:
+    found = _case(given["chute_file"], given["case"])
+    given["grains"] = {}
+    if found is None:
+        return given
+    values: dict[str, Any] = {key: known.value for key, known in found.numbers.items()} | dict(found.names)
+    if given["angle"] is not None:
+        values.pop("slope", None)
+    # In the order of the options, in which those that are given were typed.
+    for name in [one for one in given if given[one] is None and one in values]:
+        given[name] = values[name]
+    given["grains"] = {name: known.value for name, known in found.grains.items()}
+    return given
+
+
+def _case(path: str | None, name: str | None) -> Case | None:
+    """The case of --chute, --case or the environment.
+
+    Raises:
+        InputError: for two of them, an unknown case or a file that cannot be read.
+    """
+    from chuteflow.io.chute_file import read_chute
+    from chuteflow.steady.cases import case
+
+    if path is not None and name is not None:
+        raise InputError(f"--chute {path} and --case {name}: give one of them; a file may name a case itself")
+    if path is not None:
+        return read_chute(path)
+    if name is not None:
+        try:
+            return case(name)
+        except InputError as error:
+            hint = f" (a file is given by --chute {name})" if name.endswith(".toml") else ""
+            raise InputError(f"--case: {error}{hint}") from None
+    variable = os.environ.get(CASE_VARIABLE)
+    if not variable:
+        return None
+    try:
+        return read_chute(variable) if variable.endswith(".toml") else case(variable)
+    except InputError as error:
+        raise InputError(f"{CASE_VARIABLE}: {error}") from None
+
+
+case_options = _options(
+    option("--chute", "chute_file", metavar="FILE", help="A TOML file that describes the chute; options override it."),
+    option(
+        "--case",
+        metavar="NAME",
+        help="A chute or material of `chuteflow cases`; options override it. "
+        f"Where neither is given, ${CASE_VARIABLE} may name one.",
+    ),
+)
+scale_options = _options(
+    click.option("--si", is_flag=True, help="Results in SI units, with the grains of the chute's file or case."),
+    option("--diameter", metavar="LENGTH", help='Grain diameter, such as 0.001 (m) or "1 mm", for SI units.'),
+    option("--density", metavar="DENSITY", help='Grain density, such as 2500 (kg/m^3) or "2.5 g/cm^3".'),
+    option("--gravity", metavar="ACCELERATION", help="Gravity; 9.81 m/s^2 by default."),
+)
 closure_options = _options(
     option(
         "--closure",
@@ -122,7 +221,17 @@ closure_options = _options(
         "Or as part of its name: --closure extended:packing=0.64,radial=torquato.",
     ),
 )
+_model_options = _options(
+    option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
+    closure_options,
+    option(
+        "--base", metavar="NAME", help="Base: richman (the default), or johnson-jackson:specularity=0.5 and the like."
+    ),
+)
+#: All that says which chute, with or without SI units.
 chute_options = _options(
+    _described,
+    case_options,
     option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
     option("--angle", type=Number(), help="Inclination theta in degrees."),
     *(
@@ -130,12 +239,28 @@ chute_options = _options(
         for key, parameter in BY_KEY.items()
         if key != "slope"
     ),
-    option("--surface", metavar="NAME", help="Surface condition: free (the half-line, the default) or interface."),
-    closure_options,
-    option(
-        "--base", metavar="NAME", help="Base: richman (the default), or johnson-jackson:specularity=0.5 and the like."
-    ),
+    _model_options,
+    scale_options,
 )
+
+
+def range_options(slope: str) -> Callable[[Command], Command]:
+    """The same where some parameters take a range; ``slope`` says which."""
+    return _options(
+        _described,
+        case_options,
+        option("--slope", type=NumberOrInterval(), help=f"Slope tan(theta) of the chute; LO:HI {slope}."),
+        option("--angle", type=Number(), help="Inclination theta in degrees, instead of --slope."),
+        *(
+            option(f"--{key}", type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
+            for key, parameter in BY_KEY.items()
+            if key != "slope"
+        ),
+        _model_options,
+        scale_options,
+    )
+
+
 condition_options = _options(
     option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
     option("--holdup", metavar="AMOUNT", help="Mass hold-up M, mass per unit area of the base."),
@@ -145,25 +270,33 @@ condition_options = _options(
 search_range_options = _options(
     option(
         "--search-temperature",
-        type=Interval(),
+        type=Interval(units=True),
         help=f"Surface temperatures searched; {SURFACE_TEMPERATURE[0]:g}:{SURFACE_TEMPERATURE[1]:.0f} by default.",
     ),
-    option("--largest-holdup", type=Number(), help=f"Largest mass hold-up searched; {LARGEST_HOLDUP:g} by default."),
+    option(
+        "--largest-holdup", type=NumberInUnits(), help=f"Largest mass hold-up searched; {LARGEST_HOLDUP:g} by default."
+    ),
 )
 search_options = _options(
     option("--tolerance", type=Number(), help="Relative error allowed in Q, h and M; 1e-10 by default."),
     search_range_options,
 )
-output_options = _options(
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
-    option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg."),
-    option("--save", metavar="FILE", help="Write everything to FILE: .nc, .csv or .json."),
-)
-scale_options = _options(
-    option("--diameter", metavar="LENGTH", help='Grain diameter, such as 0.001 (m) or "1 mm", for SI units.'),
-    option("--density", metavar="DENSITY", help='Grain density, such as 2500 (kg/m^3) or "2.5 g/cm^3".'),
-    option("--gravity", metavar="ACCELERATION", help="Gravity; 9.81 m/s^2 by default."),
-)
+quiet_option = click.option("--quiet", is_flag=True, help="No progress and no notes on standard error.")
+
+
+def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[[Command], Command]:
+    """Options of the answer, whose files have endings of ``saved``; ``plotted`` says what is drawn."""
+    endings = f"{', '.join(saved[:-1])} or {saved[-1]}" if saved else ""
+    return _options(
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
+        _plot_option(plotted),
+        *([option("--save", metavar="FILE", help=f"Write everything to FILE: {endings}.")] if saved else []),
+        quiet_option,
+    )
+
+
+def _plot_option(what: str) -> Callable[[Command], Command]:
+    return option("--plot", metavar="FILE", help=f"Draw {what}{' ' if what else ''}into FILE: .png, .pdf or .svg.")
 
 
 def chute(given: Mapping[str, Any]) -> Chute:
@@ -189,13 +322,43 @@ def chute(given: Mapping[str, Any]) -> Chute:
     others: dict[str, Any] = {parameter.name: given[parameter.key] for parameter in material}
     others |= words(given)
     if given["angle"] is not None:
+        _require_degrees(given["angle"])
         return Chute.at_angle(given["angle"], **others)
-    others["slope"] = given["slope"]
+    slope: Any = given["slope"]
+    require_ratio(slope)
+    others["slope"] = slope
     return Chute(**others)
 
 
+def require_ratio(slope: float) -> None:
+    """Check that a slope is not an angle in degrees.
+
+    Raises:
+        InputError: asking for the angle that may be meant.
+    """
+    import math
+
+    if _STEEPEST <= slope < 90.0:
+        real = math.degrees(math.atan(slope))
+        raise InputError(
+            f"slope {slope:g}: did you mean --angle {slope:g}? A slope is tan(theta); for this one, of "
+            f"{real:.4g} degrees, write --angle {real:.8g}"
+        )
+
+
+def _require_degrees(angle: float) -> None:
+    import math
+
+    if 0.0 < angle < _FLATTEST:
+        slope = math.tan(math.radians(angle))
+        raise InputError(
+            f"angle {angle:g}: did you mean --slope {angle:g}? An angle is in degrees; for this one, of slope "
+            f"{slope:.4g}, write --slope {slope:.8g}"
+        )
+
+
 def words(given: Mapping[str, Any]) -> dict[str, str]:
-    """Surface and closure of the options, as far as they are given, as arguments of a Chute.
+    """Surface, closure and base of the options, as far as they are given, as arguments of a Chute.
 
     Raises:
         InputError: for parameters of the closure that are not KEY=VALUE.
@@ -209,25 +372,31 @@ def words(given: Mapping[str, Any]) -> dict[str, str]:
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:
-    """The scales of the options, or None where dimensionless results are asked for.
+    """The scales of the options, or None where dimensionless results are asked for: those of the chute's file or case
+    with --si, or where one of them is given.
 
     Raises:
         InputError: for scales that are incomplete, no such units or not positive.
     """
-    texts = {name: given[name] for name in _SCALES if given[name] is not None}
-    if not texts:
+    from chuteflow.steady.cases import GRAINS
+
+    texts = {name: given[name] for name in GRAINS if given[name] is not None}
+    if not texts and not given["si"]:
         return None
+    known = given["grains"]
     for name in ("diameter", "density"):
-        if name not in texts:
-            raise InputError(f"SI units need --diameter and --density: --{name} is missing")
+        if name not in texts and name not in known:
+            also = "; a --chute file or a --case of `chuteflow cases` may say them too" if given["si"] else ""
+            raise InputError(f"SI units need --diameter and --density: --{name} is missing{also}")
     from chuteflow.io.units import read_si
     from chuteflow.steady.quantities import Scales
 
-    return Scales(**{name: read_si(f"--{name}", text, _SCALES[name]) for name, text in texts.items()})
+    return Scales(**{**known, **{name: read_si(f"--{name}", text, GRAINS[name]) for name, text in texts.items()}})
 
 
 def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> dict[str, float]:
-    """The one condition of the options as an argument of :func:`chuteflow.flows`.
+    """The one condition of the options as an argument of :func:`chuteflow.flows`. A number without a unit is
+    dimensionless; beside SI units that is said.
 
     Raises:
         InputError: for none or several, or for what is not an amount.
@@ -238,11 +407,61 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
     if len(named) > 1:
         both = " and ".join(f"{_written(name)} {given[name]}" for name in named)
         raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
+    chosen = _CONDITIONS[named[0]]
+    return {chosen.key: amount(given, chosen.option, chosen.quantity, chute.slope, scales)}
+
+
+def amount(given: Mapping[str, Any], name: str, quantity: str, slope: float, scales: Scales | None) -> float:
+    """The option ``name`` as the dimensionless ``quantity``; where a bare number stands beside SI units, a note says
+    how it is taken.
+
+    Raises:
+        InputError: for text that is no amount, or a unit without grains.
+    """
+    from chuteflow.io.units import bare, read_amount
+    from chuteflow.steady.quantities import SCALED
+
+    text = str(given[name])
+    value = read_amount(_written(name), text, quantity, scales, slope)
+    if scales is not None and bare(text):
+        unit = SCALED[quantity].unit
+        note(
+            f"{_written(name)} {text} is taken as dimensionless, {value * scales.factor(quantity, slope):.5g} {unit} "
+            f'here; in SI units write {_written(name)} "{text} {unit}"'
+        )
+    return value
+
+
+def own(given: Mapping[str, Any], name: str, quantity: str, slope: float | None, scales: Scales | None) -> Any:
+    """The option ``name``, numbers of ``quantity``, dimensionless; None where it is not given. ``slope`` is None where
+    that of the chute is a range.
+
+    Raises:
+        InputError: for a unit without grains, of another kind, or where there is not one slope.
+    """
+    typed = given[name]
+    if not isinstance(typed, Amounts):
+        return typed
+    if slope is None:
+        raise InputError(
+            f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: leave the unit away"
+        )
     from chuteflow.io.units import read_amount
 
-    chosen = _CONDITIONS[named[0]]
-    amount = read_amount(_written(chosen.option), given[chosen.option], chosen.quantity, scales, chute.slope)
-    return {chosen.key: amount}
+    values = [read_amount(_written(name), f"{one} {typed.unit}", quantity, scales, slope) for one in typed.texts]
+    return values[0] if len(values) == 1 else tuple(values)
+
+
+def note(text: str) -> None:
+    """Say something on standard error that the answer does not depend on, unless --quiet is given."""
+    if not is_quiet():
+        click.echo(f"chuteflow: {' '.join(text.split())}", err=True)
+
+
+def is_quiet() -> bool:
+    """Whether the running command was given --quiet."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.params.get("quiet"))
 
 
 def _written(name: str) -> str:
@@ -263,14 +482,51 @@ def chosen(found: FlowSet, which: int | None) -> Flow:
     return found[number - 1]
 
 
-def search(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Tolerance and range of the options, as far as they are given, as arguments of the analyses."""
+def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None = None) -> dict[str, Any]:
+    """Tolerance and range of the options, as far as they are given, as arguments of the analyses; a unit counts by
+    ``scales`` on a chute of ``slope``.
+
+    Raises:
+        InputError: for a unit without grains, or of another kind.
+    """
     arguments = {
-        "tolerance": given["tolerance"],
-        "surface_temperature": given["search_temperature"],
-        "largest_holdup": given["largest_holdup"],
+        "tolerance": given.get("tolerance"),
+        "surface_temperature": own(given, "search_temperature", "surface_temperature", slope, scales),
+        "largest_holdup": own(given, "largest_holdup", "mass_holdup", slope, scales),
     }
     return {name: value for name, value in arguments.items() if value is not None}
+
+
+def nearest(
+    chute: Chute, condition: Mapping[str, float], searched: Searched, scales: Scales | None
+) -> tuple[dict[str, Any], list[str]]:
+    """The nearest that has a flow where ``chute`` has none: what JSON has of it, and lines."""
+    from chuteflow.branches.nearest import nearest as look
+    from chuteflow.io import contract, words
+
+    found = look(
+        chute,
+        **condition,
+        surface_temperature=searched.surface_temperature,
+        largest_holdup=searched.largest_holdup,
+    )
+    return {"nearest_with_flow": contract.nearest_object(found, scales)}, list(words.nearest(found, scales))
+
+
+def deliver_without_flow(
+    given: Mapping[str, Any],
+    found: FlowSet | Curve,
+    condition: Mapping[str, float],
+    scales: Scales | None,
+    empty: Mapping[str, Any],
+) -> None:
+    """Print that there is no flow, and what is nearest; the object is ``empty`` with the chute and the reason."""
+    from chuteflow.io import contract, words
+
+    near, lines = nearest(found.chute, condition, found.searched, scales)
+    content = {"chute": contract.chute_object(found.chute), **empty, "reason": found.reason, **near}
+    text = [words.in_own_units(f"no flow: {found.reason}", scales), *lines]
+    click.echo(contract.text(content) if given["as_json"] else "\n".join(text))
 
 
 def deliver_object(

@@ -8,6 +8,8 @@ from types import TracebackType
 
 import click
 
+from chuteflow.cli.options import is_quiet
+
 _CLEAR = "\r\x1b[K"
 
 
@@ -18,7 +20,7 @@ class Progress:
     """
 
     def __init__(self, seconds: float = 0.0) -> None:
-        self.is_shown = sys.stderr.isatty()
+        self.is_shown = sys.stderr.isatty() and not is_quiet()
         self._seconds, self._next = seconds, time.monotonic() + seconds
 
     def __enter__(self) -> Progress:

@@ -11,12 +11,13 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
 from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
-from chuteflow.parameters import BY_KEY, NAMES
+from chuteflow.parameters import BY_KEY, CONDITIONS, NAMES
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, PLACE, VALIDITY, Scales
+from chuteflow.steady.quantities import NUMBERS, PLACE, SCALED, VALIDITY, Scales
 from chuteflow.theory.constitutive import Law, digest
 
 #: Names of the parameters of a chute here and in :class:`chuteflow.Chute`.
@@ -34,7 +35,7 @@ def flow_set_object(flow_set: FlowSet, scales: Scales | None = None) -> dict[str
         "reason": flow_set.reason,
         "incomplete": flow_set.incomplete,
         "closure": closure_object(flow_set.chute, flow_set[0].law if len(flow_set) else None),
-        **_units(scales, NUMBERS),
+        **units_object(scales, NUMBERS),
     }
 
 
@@ -44,7 +45,7 @@ def single_flow_object(flow: Flow, scales: Scales | None = None) -> dict[str, An
         "chute": chute_object(flow.chute),
         "flows": [flow_object(flow, scales)],
         "closure": closure_object(flow.chute, flow.law),
-        **_units(scales, NUMBERS),
+        **units_object(scales, NUMBERS),
     }
 
 
@@ -58,12 +59,21 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
         "closure": closure_object(curve.chute),
         "reason": curve.reason,
         "incomplete": curve.incomplete,
-        **_units(scales, PLACE),
+        **units_object(scales, PLACE),
     }
 
 
+def nearest_object(found: Nearest, scales: Scales | None = None) -> dict[str, Any]:
+    """The nearest values that have a flow, null where none of those examined has one."""
+    values: dict[str, Any] = {SHORT[name]: value for name, value in found.parameters.items()}
+    if found.quantity is not None:
+        scale = factor(CONDITIONS[found.quantity].quantity, found.chute, scales)
+        values[found.quantity] = None if found.value is None else found.value * scale
+    return values | {"examined": {SHORT[name]: list(ends) for name, ends in found.examined.items()}}
+
+
 def chute_object(chute: Chute) -> dict[str, float | str]:
-    """The parameters of a chute."""
+    """The parameters of a chute, from which it is made again."""
     values = chute.as_dict()
     named = {short: values[name] for short, name in PARAMETERS.items()}
     return named | ({"base": values["base"]} if "base" in values else {})
@@ -184,10 +194,11 @@ def searched_object(chute: Chute, searched: Searched, scales: Scales | None = No
     }
 
 
-def _units(scales: Scales | None, names: Iterable[str]) -> dict[str, Any]:
+def units_object(scales: Scales | None, names: Iterable[str]) -> dict[str, Any]:
+    """The SI units of the quantities ``names`` by their symbols, and the scales; nothing without scales."""
     if scales is None:
         return {}
     return {
-        "units": {NUMBERS[name].symbol: NUMBERS[name].unit for name in names},
+        "units": {SCALED[name].symbol: SCALED[name].unit for name in names},
         "scales": {"diameter": scales.diameter, "density": scales.density, "gravity": scales.gravity},
     }

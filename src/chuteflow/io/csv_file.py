@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
+
+import numpy as np
 
 from chuteflow import __version__
 from chuteflow.branches.results import Curve
@@ -85,6 +87,13 @@ def require_columns(lines: Sequence[str]) -> None:
     for name, times in Counter(names).items():
         if times > 1:
             raise InputError(f"it has the column {name[:40]!r} {times} times")
+
+
+def write_columns(file: TextIO, columns: Mapping[str, Any]) -> None:
+    """Columns of equal size by name as the rows of a table, each value in full."""
+    table = csv.writer(file, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(zip(*(np.ravel(values).tolist() for values in columns.values()), strict=True))
 
 
 def _comments(result: Result, scales: Scales | None) -> Iterator[str]:

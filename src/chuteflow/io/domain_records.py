@@ -5,9 +5,7 @@ A file keeps the columns from which a map is read, so that it loads back to the 
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,7 +18,9 @@ from chuteflow.checks import checked_size, number, whole
 from chuteflow.errors import InputError
 from chuteflow.io import contract
 from chuteflow.io.contract import SHORT
-from chuteflow.io.csv_file import kept_in, lines_of, require_columns
+from chuteflow.io.csv_file import kept_in, lines_of, require_columns, write_columns
+from chuteflow.io.dataset import Dataset, Variable
+from chuteflow.io.datasets import BITS, CLASSES, DOMAIN_TITLE, dataset, outlines
 from chuteflow.io.records import (
     CHECKSUM,
     CLOSURE,
@@ -38,32 +38,13 @@ from chuteflow.io.writing import as_text
 from chuteflow.maps import KINDS_OF_BOUNDARIES, Axis, Boundary, Domain, Plane
 from chuteflow.maps.columns import Column, Part
 from chuteflow.maps.domain import COARSEST, FINEST, LARGEST_SIZE
-from chuteflow.maps.kinds import DENSITIES, INTERIORS
 from chuteflow.maps.plane import CODES, HOT_CODES
+from chuteflow.steady.quantities import Scales
 
-TITLE = "domains of existence of steady, fully developed flows of grains down a chute"
 KIND, FORMAT = "domain", 1
 #: More cells than this are not printed with an object.
 MOST_CELLS = 10_000
 _RESTORE = "# restore: "
-#: Numbers of a cell: what they mean, and what their values mean, or the bits of which they are sums.
-CLASSES: dict[str, tuple[str, dict[int, str]]] = {
-    "hot": (
-        "hot, dilute flows by the closed form of section 4",
-        {-1: "not_known_with_interface_conditions", 0: "no_hot_flows", 1: "hot_flows"},
-    ),
-    "exists": ("any flow in the range searched", {0: "no_flow", 1: "flows"}),
-    "most": ("largest number of flows that share one mass flux", {}),
-    "families": ("number of families, connected sets of flows", {}),
-    "hidden": (
-        "hidden families: more than one, so that a continuation from a known flow does not meet all",
-        {0: "none", 1: "hidden_families"},
-    ),
-    "interior": ("kinds of interior among the flows", {bit: name for name, bit in INTERIORS.items()}),
-    "density": ("kinds of density among the flows", {bit: name for name, bit in DENSITIES.items()}),
-}
-#: Those of CLASSES whose values are sums of bits.
-BITS = ("interior", "density")
 
 
 def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]:
@@ -87,6 +68,18 @@ def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]
             "M_max": found.searched.largest_holdup,
         },
     }
+
+
+def in_si(found: Domain, scales: Scales | None) -> dict[str, Any]:
+    """What an object has beside it with ``scales``: its temperatures in SI units, null where the slope is an axis, with
+    which they change."""
+    if scales is None:
+        return {}
+    plane = found.plane
+    one = "slope" not in (plane.x.name, plane.y.name)
+    factor = scales.factor("surface_temperature", plane.chute.slope)
+    temperatures = [value * factor for value in plane.temperatures]
+    return {"temperatures_si": temperatures if one else None, **contract.units_object(scales, ("surface_temperature",))}
 
 
 def shares(found: Domain) -> dict[str, Any]:
@@ -241,24 +234,22 @@ def _kept_in_json(path: Path) -> Any:
 def _write_csv(found: Domain, stream: BinaryIO) -> None:
     """One row for each cell, row by row from the lowest y, between comment lines."""
     plane = found.plane
-    layers = {name: getattr(found, name).astype(int).ravel() for name in CLASSES}
-    layers |= {
-        f"exists_at_{temperature:g}": layer.astype(int).ravel()
-        for temperature, layer in zip(plane.temperatures, found.exists_at, strict=True)
-    }
+    table = dataset(found)
     y, x = np.meshgrid(found.y, found.x, indexing="ij")
+    layers = {name: table.variables[name].values for name in CLASSES}
+    layers |= {
+        f"exists_at_{temperature:g}": layer
+        for temperature, layer in zip(plane.temperatures, found.exists_at.astype(int), strict=True)
+    }
     with as_text(stream) as file:
         file.writelines(f"# {line}\n" for line in _comments(found))
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow([plane.x.name, plane.y.name, *layers])
-        columns = [x.ravel().tolist(), y.ravel().tolist(), *(layer.tolist() for layer in layers.values())]
-        table.writerows(zip(*columns, strict=True))
+        write_columns(file, {plane.x.name: x, plane.y.name: y, **layers})
         file.write(_RESTORE + contract.text(_kept(found)) + "\n")
 
 
 def _comments(found: Domain) -> Iterator[str]:
     plane = found.plane
-    yield f"chuteflow {__version__}: {TITLE}"
+    yield f"chuteflow {__version__}: {DOMAIN_TITLE}"
     yield "theory: " + PAPER
     fixed = {k: v for k, v in plane.chute.as_dict().items() if k not in (plane.x.name, plane.y.name)}
     yield "chute: " + ", ".join(f"{name} = {value}" for name, value in fixed.items())
@@ -276,92 +267,25 @@ def _comments(found: Domain) -> Iterator[str]:
 
 def _kept_in_csv(path: Path) -> Any:
     lines = lines_of(path)
-    if not lines or TITLE not in lines[0]:
+    if not lines or DOMAIN_TITLE not in lines[0]:
         return None
     require_columns(lines)
     return kept_in(lines, _RESTORE)
 
 
 def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
-    from chuteflow.io.netcdf_file import create, fixed_text
+    from chuteflow.io.netcdf_file import create, fixed_text, history
 
-    plane = found.plane
-    x, y = plane.x.name, plane.y.name
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    fixed = {name: value for name, value in plane.chute.as_dict().items() if name not in (x, y)}
-    with create(stream) as file:
-        layers = {"temperature": len(plane.temperatures)} if plane.temperatures else {}
-        file.dimensions = {**layers, y: len(found.y), x: len(found.x)}
-        file.attrs.update(
-            {
-                "Conventions": "CF-1.11",
-                "title": TITLE,
-                "source": f"chuteflow {__version__}",
-                "history": f"{now} written by chuteflow {__version__}",
-                "references": PAPER,
-                "comment": numbers_are(None),
-                **fixed,
-                "searched_surface_temperature": np.array(found.searched.surface_temperature),
-                "searched_largest_holdup": found.searched.largest_holdup,
-                "tolerance": found.tolerance,
-                "tolerance_comment": "share of each axis to which boundaries are located",
-            }
-        )
-        for name, values in ((x, found.x), (y, found.y)):
-            _put(file, name, (name,), values, {"units": "1", "long_name": f"{name.replace('_', ' ')} of the chute"})
-        for name in CLASSES:
-            _put(file, name, (y, x), getattr(found, name).astype("i2" if name == "most" else "i1"), _flags(name))
-        if plane.temperatures:
-            attributes = {"units": "1", "long_name": "surface temperature"}
-            _put(file, "temperature", ("temperature",), np.array(plane.temperatures), attributes)
-            attributes = {"long_name": "a flow at the surface temperature", **_two("no_flow", "flow")}
-            _put(file, "exists_at", ("temperature", y, x), found.exists_at.astype("i1"), attributes)
-        _write_boundaries(file.create_group("boundaries"), found)
-        kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
-        group = file.create_group("restore")
-        group.attrs["long_name"] = "columns, from which chuteflow restores the map to the last bit"
-        group.attrs["kind"] = fixed_text(KIND)
-        group.dimensions = {"byte": len(kept)}
-        _put(group, "columns", ("byte",), kept, {})
-
-
-def _flags(name: str) -> dict[str, Any]:
-    meaning, values = CLASSES[name]
-    if not values:
-        return {"long_name": meaning, "units": "1"}
-    numbers = np.array(list(values), dtype="i1")
-    flags = "flag_masks" if name in BITS else "flag_values"
-    return {"long_name": meaning, flags: numbers, "flag_meanings": " ".join(values.values())}
-
-
-def _two(no: str, yes: str) -> dict[str, Any]:
-    return {"flag_values": np.arange(2, dtype="i1"), "flag_meanings": f"{no} {yes}"}
-
-
-def _write_boundaries(group: Any, found: Domain) -> None:
-    """All boundaries, point after point, with the number of the line and its kind."""
-    lines, kinds = found.boundaries, tuple(KINDS_OF_BOUNDARIES)
-    lengths = [len(one.points) for one in lines]
-    points = np.concatenate([np.empty((0, 2)), *(one.points for one in lines)])
-    group.attrs["long_name"] = "boundaries between classes as lines"
-    group.dimensions = {"point": len(points)}
-    for name, values in ((found.plane.x.name, points[:, 0]), (found.plane.y.name, points[:, 1])):
-        _put(group, name, ("point",), values, {"units": "1", "long_name": name.replace("_", " ")})
-    number = np.repeat(np.arange(len(lines), dtype="i4"), lengths)
-    _put(group, "line", ("point",), number, {"units": "1", "long_name": "number of the line"})
-    attributes = {
-        "long_name": "kind of boundary",
-        "flag_values": np.arange(len(kinds), dtype="i1"),
-        "flag_meanings": " ".join(kinds),
-        "comment": "; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS_OF_BOUNDARIES.items()),
+    map_ = dataset(found)
+    kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
+    about = {
+        "long_name": "columns, from which chuteflow restores the map to the last bit",
+        "kind": fixed_text(KIND),
     }
-    kind = np.repeat(np.array([kinds.index(one.kind) for one in lines], dtype="i1"), lengths)
-    _put(group, "kind", ("point",), kind, attributes)
-
-
-def _put(group: Any, name: str, dimensions: tuple[str, ...], values: np.ndarray, attributes: dict[str, Any]) -> None:
-    variable = group.create_variable(name, dimensions, values.dtype, data=values)
-    variable.attrs.update(attributes)
+    with create(stream) as file:
+        Dataset(map_.variables, {**map_.attributes, "history": history()}).write(file)
+        outlines(found).write(file.create_group("boundaries"))
+        Dataset({"columns": Variable(("byte",), kept)}, about).write(file.create_group("restore"))
 
 
 def _kept_in_netcdf(path: Path) -> Any:

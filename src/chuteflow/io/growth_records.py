@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.io import contract
+from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
     from chuteflow.stability.neutral import NeutralCurve
@@ -17,77 +18,103 @@ if TYPE_CHECKING:
 _ALONG = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}
 
 
-def wave_object(found: WaveMap) -> dict[str, Any]:
-    """What ``chuteflow growth --json`` prints."""
+def wave_object(found: WaveMap, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow growth --json`` prints; in SI units where ``scales`` are given."""
+    chute = found.flow.chute
+    wave, rate = (contract.factor(name, chute, scales) for name in ("wavenumber", "growth"))
     return {
-        "chute": contract.chute_object(found.flow.chute),
-        "flow": contract.flow_object(found.flow),
-        "kx": found.kx.tolist(),
-        "ky": found.ky.tolist(),
-        "growth": _finite(found.growth),
-        "frequency": _finite(found.frequency),
-        "threshold": found.smallest_rate,
+        "chute": contract.chute_object(chute),
+        "flow": contract.flow_object(found.flow, scales),
+        "kx": (wave * found.kx).tolist(),
+        "ky": (wave * found.ky).tolist(),
+        "growth": _finite(rate * found.growth),
+        "frequency": _finite(rate * found.frequency),
+        "threshold": rate * found.smallest_rate,
         "growing": int(found.grows.sum()),
         "unresolved": [
-            {"kx": float(found.kx[i]), "ky": float(found.ky[j])} for i, j in np.argwhere(found.unresolved).tolist()
+            {"kx": wave * float(found.kx[i]), "ky": wave * float(found.ky[j])}
+            for i, j in np.argwhere(found.unresolved).tolist()
         ],
         "neutral": [
-            {"kx": curve.z[:, 0].tolist(), "ky": curve.z[:, 1].tolist(), **_of_curve(curve)} for curve in found.neutral
+            {
+                "kx": (wave * curve.z[:, 0]).tolist(),
+                "ky": (wave * curve.z[:, 1]).tolist(),
+                **_of_curve(curve, rate, wave),
+            }
+            for curve in found.neutral
         ],
+        **contract.units_object(scales, (*NUMBERS, "wavenumber", "growth")),
     }
 
 
-def family_object(found: FamilyMap) -> dict[str, Any]:
-    """What ``chuteflow neutral --json`` prints."""
+def family_object(found: FamilyMap, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow neutral --json`` prints; in SI units where ``scales`` are given."""
+    rate = contract.factor("growth", found.flows[0].chute, scales)
     return {
         "chute": contract.chute_object(found.flows[0].chute),
         "angle": found.angle,
         "kh": found.depth_wavenumber.tolist(),
-        "flows": _numbers(found.flows),
-        "growth": _finite(found.growth),
-        "frequency": _finite(found.frequency),
-        "threshold": found.smallest_rate.tolist(),
+        "flows": _numbers(found.flows, scales),
+        "growth": _finite(rate * found.growth),
+        "frequency": _finite(rate * found.frequency),
+        "threshold": (rate * found.smallest_rate).tolist(),
         "growing": int(found.grows.sum()),
         "unresolved": [
-            {"kh": float(found.depth_wavenumber[i]), **_place(found.flows[j])}
+            {"kh": float(found.depth_wavenumber[i]), **_place(found.flows[j], scales)}
             for i, j in np.argwhere(found.unresolved).tolist()
         ],
         "neutral": [
-            {"kh": curve.z[:, 0].tolist(), **_numbers(flows), **_of_curve(curve)}
+            {
+                "kh": curve.z[:, 0].tolist(),
+                **_numbers(flows, scales),
+                **_of_curve(curve, rate, 1.0),
+            }
             for curve, flows in zip(found.neutral, found.neutral_flows, strict=True)
         ],
+        **contract.units_object(scales, (*_ALONG.values(), "growth")),
     }
 
 
-def wave_rows(found: WaveMap) -> Iterator[list[str]]:
+def wave_rows(found: WaveMap, scales: Scales | None = None) -> Iterator[list[str]]:
     """The map as rows of CSV; an empty cell where growth is not known."""
+    wave, rate = (contract.factor(name, found.flow.chute, scales) for name in ("wavenumber", "growth"))
     yield ["kx", "ky", "growth", "frequency"]
-    for i, along in enumerate(found.kx.tolist()):
-        for j, across in enumerate(found.ky.tolist()):
-            cells = (along, across, float(found.growth[i, j]), float(found.frequency[i, j]))
+    for i, along in enumerate((wave * found.kx).tolist()):
+        for j, across in enumerate((wave * found.ky).tolist()):
+            cells = (along, across, rate * float(found.growth[i, j]), rate * float(found.frequency[i, j]))
             yield ["" if np.isnan(cell) else repr(cell) for cell in cells]
 
 
-def family_rows(found: FamilyMap) -> Iterator[list[str]]:
+def family_rows(found: FamilyMap, scales: Scales | None = None) -> Iterator[list[str]]:
     """The map as rows of CSV; an empty cell where growth is not known."""
+    rate = contract.factor("growth", found.flows[0].chute, scales)
     yield ["kh", *_ALONG, "growth", "frequency"]
     for j, flow in enumerate(found.flows):
-        of_flow = [float(getattr(flow, name)) for name in _ALONG.values()]
+        of_flow = [*_place(flow, scales).values()]
         for i, kh in enumerate(found.depth_wavenumber.tolist()):
-            cells = (kh, *of_flow, float(found.growth[i, j]), float(found.frequency[i, j]))
+            cells = (kh, *of_flow, rate * float(found.growth[i, j]), rate * float(found.frequency[i, j]))
             yield ["" if np.isnan(cell) else repr(cell) for cell in cells]
 
 
-def _of_curve(curve: NeutralCurve) -> dict[str, Any]:
-    return {"frequency": curve.frequency.tolist(), "error": curve.error.tolist(), "ends": list(curve.ends)}
+def _of_curve(curve: NeutralCurve, rate: float, error: float) -> dict[str, Any]:
+    """What a curve has along it, by the scales of its frequency and of its error."""
+    return {
+        "frequency": (rate * curve.frequency).tolist(),
+        "error": (error * curve.error).tolist(),
+        "ends": list(curve.ends),
+    }
 
 
-def _place(flow: Flow) -> dict[str, float]:
-    return {symbol: float(getattr(flow, name)) for symbol, name in _ALONG.items()}
+def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
+    return {
+        symbol: float(getattr(flow, name)) * contract.factor(name, flow.chute, scales)
+        for symbol, name in _ALONG.items()
+    }
 
 
-def _numbers(flows: Any) -> dict[str, list[float]]:
-    return {symbol: [float(getattr(flow, name)) for flow in flows] for symbol, name in _ALONG.items()}
+def _numbers(flows: Any, scales: Scales | None) -> dict[str, list[float]]:
+    places = [_place(flow, scales) for flow in flows]
+    return {symbol: [place[symbol] for place in places] for symbol in _ALONG}
 
 
 def _finite(values: Any) -> list[list[float | None]]:

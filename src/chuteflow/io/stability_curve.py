@@ -26,14 +26,16 @@ LABELS = {
 def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
     """The judged flows of each branch: their place, whether they are stable, and the mode that grows fastest.
 
-    Rates and wavenumbers are dimensionless; ``stable`` is null where it is not known.
+    ``stable`` is null where it is not known.
     """
     return [
         [
             {
                 **_place(sample.flow, scales),
                 "stable": None if sample.found is None else sample.found.stable,
-                "mode": None if sample.found is None or sample.found.mode is None else mode_object(sample.found.mode),
+                "mode": None
+                if sample.found is None or sample.found.mode is None
+                else mode_object(sample.found.mode, chute=sample.flow.chute, scales=scales),
             }
             for sample in branch.samples
         ]

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from chuteflow.branches.results import FlowSet
-from chuteflow.io.contract import chute_object, finite, flow_object, searched_object
+from chuteflow.io.contract import chute_object, factor, finite, flow_object, searched_object, units_object
 from chuteflow.stability.answers import Answer
 from chuteflow.stability.budget import Budget
 from chuteflow.stability.modes import Mode
 from chuteflow.stability.verdict import Stability
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.quantities import DISTURBANCES, NUMBERS, Scales
 
 #: The disturbed fields, in the order of :attr:`Mode.fields`.
 FIELDS = ("nu", "u", "v", "w", "T")
@@ -20,82 +22,95 @@ FIELDS = ("nu", "u", "v", "w", "T")
 COLUMNS = ("Q", "h", "M", "T_surface", "stable", "kind", "kx", "ky", "growth", "frequency", "speed", "error")
 
 
-def answers_object(flows: FlowSet, answers: Sequence[Answer], *, fields: bool = False) -> dict[str, Any]:
-    """What ``chuteflow stability --json`` prints; with ``fields`` the disturbed fields of each mode too."""
+def answers_object(
+    flows: FlowSet, answers: Sequence[Answer], *, fields: bool = False, scales: Scales | None = None
+) -> dict[str, Any]:
+    """What ``chuteflow stability --json`` prints; with ``fields`` the disturbed fields of each mode too, which stay
+    relative to one another where ``scales`` are given."""
     return {
         "chute": chute_object(flows.chute),
-        "flows": [_answer(answer, fields) for answer in answers],
-        "searched": searched_object(flows.chute, flows.searched),
+        "flows": [_answer(answer, fields, scales) for answer in answers],
+        "searched": searched_object(flows.chute, flows.searched, scales),
         "reason": flows.reason,
+        **units_object(scales, (*NUMBERS, *DISTURBANCES)),
     }
 
 
-def mode_object(mode: Mode, *, fields: bool = False) -> dict[str, Any]:
-    """One mode; with ``fields`` heights, and real and imaginary parts of the disturbances there."""
+def mode_object(
+    mode: Mode, *, fields: bool = False, chute: Chute | None = None, scales: Scales | None = None
+) -> dict[str, Any]:
+    """One mode; with ``fields`` heights, and real and imaginary parts of the disturbances there. In SI units where the
+    ``chute`` and ``scales`` are given."""
+
+    def by(name: str) -> float:
+        return 1.0 if chute is None else factor(name, chute, scales)
+
     numbers: dict[str, Any] = {
-        "kx": mode.kx,
-        "ky": mode.ky,
-        "growth": finite(mode.growth),
-        "frequency": finite(mode.frequency),
-        "speed": None if mode.speed is None else finite(mode.speed),
+        "kx": by("wavenumber") * mode.kx,
+        "ky": by("wavenumber") * mode.ky,
+        "growth": finite(by("growth") * mode.growth),
+        "frequency": finite(by("frequency") * mode.frequency),
+        "speed": None if mode.speed is None else finite(by("wave_speed") * mode.speed),
         "kind": mode.kind,
-        "error": finite(mode.error),
+        "error": finite(by("growth") * mode.error),
     }
     if fields:
-        numbers["z"] = mode.height.tolist()
+        numbers["z"] = (by("height") * mode.height).tolist()
         for name, values in zip(FIELDS, mode.fields, strict=True):
             numbers[name] = {"real": np.real(values).tolist(), "imaginary": np.imag(values).tolist()}
     return numbers
 
 
-def budget_object(budget: Budget) -> dict[str, Any]:
-    """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates."""
+def budget_object(budget: Budget, rate: float = 1.0) -> dict[str, Any]:
+    """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates,
+    which are multiplied by ``rate``."""
     return {
-        "growth": finite(budget.mode.growth),
+        "growth": finite(rate * budget.mode.growth),
         "closure": finite(budget.closure),
         "shares": dict(zip(("kinetic", "density", "thermal"), map(finite, budget.shares), strict=True)),
         "terms": {
             term.name.replace(" ", "_"): {
-                "kinetic": finite(term.kinetic),
-                "density": finite(term.density),
-                "thermal": finite(term.thermal),
-                "total": finite(term.total),
+                "kinetic": finite(rate * term.kinetic),
+                "density": finite(rate * term.density),
+                "thermal": finite(rate * term.thermal),
+                "total": finite(rate * term.total),
             }
             for term in budget.terms
         },
     }
 
 
-def csv_rows(answers: Sequence[Answer]) -> list[list[str]]:
+def csv_rows(answers: Sequence[Answer], scales: Scales | None = None) -> list[list[str]]:
     """A head and one row for each mode, or one for a flow without; empty where there is no number."""
     rows: list[list[str]] = [list(COLUMNS)]
     for answer in answers:
-        flow = flow_object(answer.flow)
+        flow = flow_object(answer.flow, scales)
         start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]
         known = None if answer.found is None else answer.found.stable
         stable = "" if known is None else str(known).lower()
         for mode in answer.modes or (None,):
-            numbers = {} if mode is None else mode_object(mode)
+            numbers = {} if mode is None else mode_object(mode, chute=answer.flow.chute, scales=scales)
             cells = [numbers.get(name) for name in COLUMNS[5:]]
             rows.append([*start, stable, *("" if cell is None else str(cell) for cell in cells)])
     return rows
 
 
-def _answer(answer: Answer, fields: bool) -> dict[str, Any]:
-    found = answer.found
-    modes = [mode_object(mode, fields=fields) for mode in answer.modes]
+def _answer(answer: Answer, fields: bool, scales: Scales | None) -> dict[str, Any]:
+    found, chute = answer.found, answer.flow.chute
+    modes = [mode_object(mode, fields=fields, chute=chute, scales=scales) for mode in answer.modes]
+    wave, rate = (factor(name, chute, scales) for name in ("wavenumber", "growth"))
     return {
-        **flow_object(answer.flow),
+        **flow_object(answer.flow, scales),
         "stable": None if found is None else found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
-        "budget": None if answer.budget is None else budget_object(answer.budget),
+        "budget": None if answer.budget is None else budget_object(answer.budget, rate),
         "grows": None if found is None or found.mode is None else found.grows,
-        "threshold": None if found is None else found.smallest_rate,
-        "wavenumbers": None if found is None else list(found.searched),
+        "threshold": None if found is None else rate * found.smallest_rate,
+        "wavenumbers": None if found is None else [wave * k for k in found.searched],
         "complete": False if found is None else found.complete,
         "examined": 0 if found is None else found.examined,
-        "unresolved": [] if found is None else [{"kx": kx, "ky": ky} for kx, ky in found.unresolved],
+        "unresolved": [] if found is None else [{"kx": wave * kx, "ky": wave * ky} for kx, ky in found.unresolved],
         "why": answer.reason or (None if found is None else why_unknown(found)),
     }
 

@@ -12,17 +12,21 @@ from typing import TYPE_CHECKING, Any
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.steady.flow import Flow, Profile
-from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, Scales
+from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, SCALED, Scales
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 #: A number and the unit after it: names with small powers, multiplied or divided. Nothing else reaches pint,
 #: whose parser takes more than it can evaluate.
-_NAME = r"[^\W\d_]+(?:(?:\^|\*\*)-?\d|[²³])?"
-_AMOUNT = re.compile(
-    rf"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*({_NAME}(?:\s*[*/·]\s*{_NAME}|\s+{_NAME})*)\s*"
-)
+_NAME = r"[^\W\d_]+(?:(?:\^|\*\*)?-?\d|[²³])?"
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_UNIT = rf"(?:1\s*/\s*)?{_NAME}(?:\s*[*/·]\s*{_NAME}|\s+{_NAME})*"
+_AMOUNT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT})\s*")
+#: A power without a sign between, as in "m2/s", which pint does not read.
+_POWER = re.compile(r"(?<=[^\W\d_])(-?\d)")
+#: Quantities of mass that may be given by volume of the grains: their units times that of a density.
+_BY_VOLUME = {"mass_flux": "m^2/s", "mass_holdup": "m"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,16 +90,44 @@ def read_amount(what: str, text: str, name: str, scales: Scales | None, slope: f
     """The quantity ``name`` of the registry, dimensionless: a plain number as it is, an amount with a unit by
     ``scales`` on a chute of ``slope``.
 
+    A mass flux may be given in m^2/s and a hold-up in m, which is then the volume of the grains alone.
+
     Raises:
         InputError: naming ``what``, for text that is neither, or a unit without scales.
     """
     plain = _plain(text)
     if plain is not None:
         return plain
-    value = _converted(what, text, QUANTITIES[name].unit, "dimensionless")
+    unit, density = SCALED[name].unit, 1.0
+    if name in _BY_VOLUME and scales is not None and _is_like(text, _BY_VOLUME[name]):
+        unit, density = _BY_VOLUME[name], scales.density
+    value = _converted(what, text, unit, "dimensionless") * density
     if scales is None:
         raise InputError(f"{what} {text!r}: a unit needs the grains, give their diameter and density too")
     return value / scales.factor(name, slope)
+
+
+def bare(text: str) -> bool:
+    """Whether an amount is a number without a unit."""
+    return _plain(text) is not None
+
+
+def _is_like(text: str, unit: str) -> bool:
+    """Whether ``text`` has a unit of the kind of ``unit``."""
+    match = _AMOUNT.fullmatch(text)
+    if match is None:
+        return False
+    import pint
+
+    try:
+        return bool(_registry().parse_units(_with_powers(match[2])).is_compatible_with(unit))
+    except (pint.PintError, ArithmeticError):
+        return False
+
+
+def _with_powers(unit: str) -> str:
+    """A unit as pint reads it: "m2/s" is "m^2/s"."""
+    return _POWER.sub(r"^\1", unit)
 
 
 def _plain(text: str) -> float | None:
@@ -113,7 +145,9 @@ def _converted(what: str, text: str, unit: str, plain: str) -> float:
 
     registry = _registry()
     try:
-        value = float(registry.Quantity(float(match[1]), registry.parse_units(match[2])).m_as(_spelled(unit)))
+        value = float(
+            registry.Quantity(float(match[1]), registry.parse_units(_with_powers(match[2]))).m_as(_spelled(unit))
+        )
     except pint.DimensionalityError:
         raise InputError(f"{what} {text!r}: {match[2]!r} is not a unit like {unit}") from None
     except (pint.PintError, ArithmeticError):

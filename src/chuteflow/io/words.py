@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Curve, Searched
 from chuteflow.io.contract import factor
 from chuteflow.io.tables import number
-from chuteflow.parameters import PARAMETERS
+from chuteflow.parameters import CONDITIONS, PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import SCALED, Scales
 from chuteflow.steady.validity import WORDS
 
 _DENSITIES = {
@@ -40,6 +41,7 @@ def notes(flows: Sequence[Flow]) -> list[str]:
     depth = "that of the interface, or " if any(flow.chute.surface == "interface" for flow in flows) else ""
     return [
         f"depth: {depth}the height above which nu is below 1 % of nu_max; the centre of mass is h",
+        "U: Q/M; Fr: U/sqrt(g cos(theta) depth); nu_mean: over the depth",
         *(f"{word}: {meaning}" for word, meaning in WORDS.items() if word in said),
     ]
 
@@ -85,6 +87,28 @@ def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
     )
 
 
+def nearest(found: Nearest, scales: Scales | None) -> Iterator[str]:
+    """What is nearest to a chute without a flow, one number changed at a time."""
+    known = {name: value for name, value in found.parameters.items() if value is not None}
+    said = [
+        f"{PARAMETERS[name].symbol} = {number(value)}"
+        + (f" ({math.degrees(math.atan(value)):.4g} degrees)" if name == "slope" else "")
+        for name, value in known.items()
+    ]
+    if found.quantity is not None and found.value is not None:
+        name = CONDITIONS[found.quantity].quantity
+        said.append(f"{found.quantity} = {amount(name, found.value, found.chute, scales)}")
+    none = [
+        f"{PARAMETERS[name].symbol} from {number(low)} to {number(high)}"
+        for name, (low, high) in found.examined.items()
+        if name not in known
+    ]
+    if said:
+        yield f"nearest with a flow, one number changed at a time: {' or '.join(said)}"
+    if none:
+        yield f"no flow either with {' or '.join(none)}, at the values examined"
+
+
 def multiplicity(curve: Curve, scales: Scales | None) -> str:
     """How many flows share one mass flux, from folds and ends of the branches."""
     flux, unit = factor("mass_flux", curve.chute, scales), _unit("mass_flux", scales)
@@ -107,5 +131,10 @@ def _fluxes(count: Count, factor: float) -> str:
     return f"Q above {low}" if count.high == math.inf else f"Q from {low} to {high}"
 
 
+def amount(name: str, value: float, chute: Chute, scales: Scales | None) -> str:
+    """A dimensionless value of the quantity ``name``, with its unit where there are ``scales``."""
+    return f"{number(value * factor(name, chute, scales))}{_unit(name, scales)}"
+
+
 def _unit(name: str, scales: Scales | None) -> str:
-    return "" if scales is None else f" {NUMBERS[name].unit}"
+    return "" if scales is None or SCALED[name].unit == "1" else f" {SCALED[name].unit}"

@@ -27,6 +27,7 @@ from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
 from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
@@ -43,7 +44,7 @@ LARGEST_SIZE = 5000
 
 
 @dataclass(frozen=True, eq=False)
-class Domain:
+class Domain(Result):
     """Classes over ``plane``, on a grid of cells and by their outlines.
 
     ``x`` (m,) and ``y`` (n,) are the centres of the cells. All else on the grid is (n, m), row by row from the

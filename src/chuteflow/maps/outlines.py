@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from chuteflow import display
 from chuteflow.maps.columns import Column, Part, alike, part
 from chuteflow.maps.plane import CODES, HOT_CODES, Plane
+from chuteflow.result import Compared
 
 #: A point: shares of the outer and of the inner axis.
 Point = tuple[float, float]
@@ -26,7 +27,7 @@ _Stretch = tuple[Point, Point]
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary:
+class Boundary(Compared):
     """A line between two classes.
 
     ``kind`` is one of KINDS_OF_BOUNDARIES; ``values`` are those of the number that changes, the lesser first, or
@@ -45,7 +46,7 @@ class Boundary:
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class Region(Compared):
     """A polygon (k, 2) of x and y in which a number has one ``value``."""
 
     value: int

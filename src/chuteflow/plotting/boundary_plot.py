@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow.bifurcations.boundary import BoundarySet
-from chuteflow.bifurcations.diagram import Diagram, Sides
+from chuteflow.bifurcations.boundary import Boundary, BoundarySet
+from chuteflow.bifurcations.diagram import Diagram, Region, Sides
 from chuteflow.bifurcations.tracing import TURNS
 from chuteflow.branches.results import KINDS
+from chuteflow.io.contract import factor
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
-from chuteflow.steady.quantities import NUMBERS
+from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +33,8 @@ _LIMIT = style.Stroke(style.GREY, style.DOTTED)
 
 
 @style.own_settings()
-def plot_boundaries(shown: Diagram) -> Figure:
-    """The boundaries of a diagram against the second parameter.
+def plot_boundaries(shown: Diagram, *, scales: Scales | None = None) -> Figure:
+    """The boundaries of a diagram against the second parameter; numbers in SI units where ``scales`` are given.
 
     Where the quantity is the one that folds, a number in each region says how many flows share a value of it, in the
     range searched, whose edges are drawn too. Beside other boundaries stands the kind of the flows on either side.
@@ -39,17 +42,20 @@ def plot_boundaries(shown: Diagram) -> Figure:
     found, quantity = shown.found, shown.quantity
     figure, (ax,) = style.panels(1, width=5.6, height=4.4)
     for i, boundary in enumerate(found):
-        ax.plot(boundary.parameter, getattr(boundary, quantity), **style.stroke(i).line())
+        ax.plot(boundary.parameter, _along(boundary, quantity, scales), **style.stroke(i).line())
         for turn in boundary.special:
             x, y = getattr(turn.flow.chute, found.second), getattr(turn.flow, quantity)
+            y *= factor(quantity, turn.flow.chute, scales)
             ax.plot([x], [y], **_marker(turn.kind, style.stroke(i).colour))
     if shown.frame.logarithmic:
         style.logarithmic(ax, "y")
     for edge in shown.edges:
-        ax.plot(edge.parameter, getattr(edge, quantity), zorder=1, **_LIMIT.line(0.9))
-    ax.set(xlim=shown.frame.x, ylim=shown.frame.y)
+        ax.plot(edge.parameter, _along(edge, quantity, scales), zorder=1, **_LIMIT.line(0.9))
+    ends = [factor(quantity, replace(found.chute, **{found.second: x}), scales) for x in shown.frame.x]
+    low, high = shown.frame.y
+    ax.set(xlim=shown.frame.x, ylim=(low * min(ends), high * max(ends)))
     second = PARAMETERS[found.second]
-    style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity))
+    style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity, scales))
     style.caption(figure, f"{KINDS[found.kind]}\n{parameters(found.chute, found.second)}")
     key = list(_key(shown))
     beside = all(len(entry.get_label()) < _LONG for entry in key)
@@ -57,10 +63,45 @@ def plot_boundaries(shown: Diagram) -> Figure:
     figure.draw_without_rendering()  # which settles where points are
     for region in shown.regions:
         style.write(
-            ax, region.parameter, region.value, str(region.flows), ha="center", va="center", fontsize=11.0, zorder=5
+            ax,
+            region.parameter,
+            _at(found, region, quantity, scales),
+            str(region.flows),
+            ha="center",
+            va="center",
+            fontsize=11.0,
+            zorder=5,
         )
     for one in shown.sides:
-        _name_sides(ax, one, quantity)
+        _name_sides(ax, one, quantity, scales)
+    return figure
+
+
+def _along(boundary: Boundary, quantity: str, scales: Scales | None) -> Array:
+    """The quantity along a boundary, each flow by the scale of its own slope."""
+    return np.array([getattr(flow, quantity) * factor(quantity, flow.chute, scales) for flow in boundary.flows])
+
+
+def _at(found: BoundarySet, region: Region, quantity: str, scales: Scales | None) -> float:
+    return region.value * factor(quantity, replace(found.chute, **{found.second: region.parameter}), scales)
+
+
+@style.own_settings()
+def plot_boundary(boundary: Boundary, quantity: str = "mass_flux", *, scales: Scales | None = None) -> Figure:
+    """One boundary against the second parameter, with its turning points."""
+    figure, (ax,) = style.panels(1, width=5.6, height=3.8)
+    values = _along(boundary, quantity, scales)
+    ax.plot(boundary.parameter, values, **style.stroke(0).line())
+    for turn in boundary.special:
+        y = getattr(turn.flow, quantity) * factor(quantity, turn.flow.chute, scales)
+        x = getattr(turn.flow.chute, boundary.second)
+        ax.plot([x], [y], label=f"{turn.kind}: {TURNS[turn.kind]}", **_marker(turn.kind, style.stroke(0).colour))
+    style.spread_scale(ax, "y", [values])
+    second = PARAMETERS[boundary.second]
+    style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity, scales))
+    style.caption(figure, f"{KINDS[boundary.kind]}\n{parameters(boundary.flows[0].chute, boundary.second)}")
+    if boundary.special:
+        style.legend(figure, handles=ax.get_lines()[1:], loc="outside lower center")
     return figure
 
 
@@ -69,10 +110,11 @@ def plot_none(found: BoundarySet) -> Figure:
     return style.sentence(f"No boundary: {found.reason}.")
 
 
-def _name_sides(ax: Axes, beside: Sides, quantity: str) -> None:
+def _name_sides(ax: Axes, beside: Sides, quantity: str, scales: Scales | None) -> None:
     """Write the kinds of flows to both sides of a boundary."""
     boundary, index = beside.boundary, beside.index
-    places = ax.transData.transform(np.column_stack([boundary.parameter, getattr(boundary, quantity)]))
+    values = _along(boundary, quantity, scales)
+    places = ax.transData.transform(np.column_stack([boundary.parameter, values]))
     along = places[index + 1] - places[index - 1]
     across = np.array([along[1], -along[0]]) / np.hypot(*along)
     right = across if across[0] > 0.0 else -across
@@ -80,7 +122,7 @@ def _name_sides(ax: Axes, beside: Sides, quantity: str) -> None:
         style.write(
             ax,
             float(boundary.parameter[index]),
-            float(getattr(boundary, quantity)[index]),
+            float(values[index]),
             kind,
             xytext=tuple(_BESIDE * aside),
             ha="left" if aside[0] > 0.0 else "right",

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chuteflow.branches.results import Curve, FlowSet
+from chuteflow.io.contract import factor
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.plotting import plots, style
+from chuteflow.steady.quantities import Scales
 from chuteflow.theory.constitutive import FUNCTIONS, Law
 
 if TYPE_CHECKING:
@@ -65,28 +67,30 @@ def plot_laws(laws: Sequence[Law], e: float, slope: float) -> Figure:
 
 
 @style.own_settings()
-def plot_comparison(found: Sequence[FlowSet], curves: Sequence[Curve]) -> Figure:
+def plot_comparison(found: Sequence[FlowSet], curves: Sequence[Curve], *, scales: Scales | None = None) -> Figure:
     """Q-h curves of one chute under several laws, and profiles of the flows at one flux, each law with its colour."""
     figure, axes = style.panels(4, height=3.6)
     top = _TOP * max((flow.centre_of_mass for flows in found for flow in flows), default=1.0)
     handles = []
+    by = {name: factor(name, found[0].chute, scales) for name in ("mass_flux", "centre_of_mass", "height", *_FIELDS)}
     for i, (flows, curve) in enumerate(zip(found, curves, strict=True)):
         stroke = style.stroke(i).line()
         for branch in curve.branches:
-            (line,) = axes[0].plot(branch.mass_flux, branch.centre_of_mass, label=str(curve.chute.closure), **stroke)
+            place = (by[name] * getattr(branch, name) for name in ("mass_flux", "centre_of_mass"))
+            (line,) = axes[0].plot(*place, label=str(curve.chute.closure), **stroke)
             if branch is curve.branches[0]:
                 handles.append(line)
         for flow in flows:
             profile = flow.sampled(_POINTS, min(top, flow.interface_height))
             for ax, field in zip(axes[1:], _FIELDS, strict=True):
-                ax.plot(getattr(profile, field), profile.height, **stroke)
+                ax.plot(by[field] * getattr(profile, field), by["height"] * profile.height, **stroke)
     axes[0].set_xscale("log")
     axes[0].set_yscale("log")
-    style.name_axes(axes[0], style.label("mass_flux", None), style.label("centre_of_mass", None))
+    style.name_axes(axes[0], style.label("mass_flux", scales), style.label("centre_of_mass", scales))
     for ax, field in zip(axes[1:], _FIELDS, strict=True):
-        style.name_axes(ax, style.label(field, None), style.label("height", None))
+        style.name_axes(ax, style.label(field, scales), style.label("height", scales))
         ax.set_xlim(left=0.0)
-        ax.set_ylim(0.0, top)
+        ax.set_ylim(0.0, by["height"] * top)
     style.caption(figure, plots.parameters(found[0].chute).rpartition(", closure")[0])
     style.legend(figure, handles=handles, loc="outside lower center", ncols=2)
     return figure

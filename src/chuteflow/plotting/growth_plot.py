@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chuteflow.io.contract import factor
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
-from chuteflow.steady.quantities import NUMBERS
+from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,53 +29,64 @@ _NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
 
 
 @style.own_settings()
-def plot_wave_map(found: WaveMap) -> Figure:
-    """Growth over wavenumbers along and across the slope."""
+def plot_wave_map(found: WaveMap, *, scales: Scales | None = None) -> Figure:
+    """Growth over wavenumbers along and across the slope; in SI units where ``scales`` are given."""
     figure, (ax,) = style.panels(1, width=5.2, height=4.2)
-    _shaded(figure, ax, found.kx, found.ky, found.growth, found.unresolved)
+    chute = found.flow.chute
+    wave = factor("wavenumber", chute, scales)
+    kx, ky = wave * found.kx, wave * found.ky
+    _shaded(figure, ax, kx, ky, factor("growth", chute, scales) * found.growth, found.unresolved, scales)
     for curve in found.neutral:
-        ax.plot(*curve.z.T, **_NEUTRAL.line(1.6))
+        ax.plot(*(wave * curve.z.T), **_NEUTRAL.line(1.6))
     growth = np.where(found.grows, found.growth, -np.inf)
     i, j = np.unravel_index(int(growth.argmax()), growth.shape)
     if found.grows[i, j]:
-        ax.plot(
-            found.kx[i], found.ky[j], marker="+", markersize=8.0, color=style.BLACK, clip_on=False, linestyle="none"
-        )
-    style.name_axes(ax, "wavenumber along the slope, $k_x$", "wavenumber across the slope, $k_y$")
-    ax.set_xlim(found.kx[0], found.kx[-1])
-    ax.set_ylim(found.ky[0], found.ky[-1])
-    flow = found.flow
-    place = rf"$Q = {flow.mass_flux:.4g}$, $h = {flow.centre_of_mass:.4g}$"
-    style.caption(figure, f"{parameters(flow.chute)}\n{place}; bold: neutral{_hatched(found.growth)}")
+        ax.plot(kx[i], ky[j], marker="+", markersize=8.0, color=style.BLACK, clip_on=False, linestyle="none")
+    unit = style.unit("wavenumber", scales)
+    style.name_axes(ax, f"wavenumber along the slope, $k_x${unit}", f"wavenumber across the slope, $k_y${unit}")
+    ax.set_xlim(kx[0], kx[-1])
+    ax.set_ylim(ky[0], ky[-1])
+    numbers = {name: getattr(found.flow, name) for name in ("mass_flux", "centre_of_mass")}
+    place = ", ".join(
+        f"${NUMBERS[name].latex} = {value * factor(name, chute, scales):.4g}${style.unit(name, scales)}"
+        for name, value in numbers.items()
+    )
+    style.caption(figure, f"{parameters(chute)}\n{place}; bold: neutral{_hatched(found.growth)}")
     return figure
 
 
 @style.own_settings()
-def plot_family_map(found: FamilyMap) -> Figure:
+def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure:
     """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
-    temperature = np.array([flow.surface_temperature for flow in found.flows])
+    chute = found.flows[0].chute
+    rate, heat, flux_scale = (factor(name, chute, scales) for name in ("growth", "surface_temperature", "mass_flux"))
+    temperature = heat * np.array([flow.surface_temperature for flow in found.flows])
     place = np.linspace(0.0, 1.0, len(temperature))
-    _shaded(figure, left, found.depth_wavenumber, place, found.growth, found.unresolved)
+    _shaded(figure, left, found.depth_wavenumber, place, rate * found.growth, found.unresolved, scales)
     style.logarithmic(left, "x")
     ticks = _round_places(place, temperature)
     left.set_yticks([*ticks], [*ticks.values()])
     left.set_ylim(0.0, 1.0)
     for i, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True)):
         left.plot(*curve.z.T, **_NEUTRAL.line(1.6))
-        flux = [flow.mass_flux for flow in flows]
+        flux = [flux_scale * flow.mass_flux for flow in flows]
         right.plot(flux, curve.z[:, 0], label=f"neutral curve {i + 1}", **style.stroke(i).line())
-    style.name_axes(left, "$k h$", f"${NUMBERS['surface_temperature'].latex}$ along the family")
-    style.name_axes(right, style.label("mass_flux"), "$k h$")
-    style.spread_scale(right, "x", [[flow.mass_flux for flow in flows] for flows in found.neutral_flows])
+    style.name_axes(left, "$k h$", _along(scales))
+    style.name_axes(right, style.label("mass_flux", scales), "$k h$")
+    style.spread_scale(right, "x", [[flux_scale * flow.mass_flux for flow in flows] for flows in found.neutral_flows])
     style.logarithmic(right, "y")
     if found.neutral:
         style.legend(right)
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
         found.angle, f"waves at {found.angle:g} degrees to the slope"
     )
-    style.caption(figure, f"{parameters(found.flows[0].chute)}; {waves}; bold: neutral{_hatched(found.growth)}")
+    style.caption(figure, f"{parameters(chute)}; {waves}; bold: neutral{_hatched(found.growth)}")
     return figure
+
+
+def _along(scales: Scales | None) -> str:
+    return f"${NUMBERS['surface_temperature'].latex}${style.unit('surface_temperature', scales)} along the family"
 
 
 def _round_places(place: Any, temperature: Any) -> dict[float, str]:
@@ -102,7 +114,7 @@ def _hatched(growth: Any) -> str:
     return "" if np.isfinite(growth).all() else "; hatched: no mode told"
 
 
-def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any) -> None:
+def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any, scales: Scales | None) -> None:
     """Shades that are white at zero growth, hatches where no mode is told, and crosses where growth is not known."""
     from matplotlib.patches import Rectangle
     from matplotlib.ticker import MaxNLocator
@@ -128,7 +140,7 @@ def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: A
     bar.ax.yaxis.get_offset_text().set(fontsize=7.5, fontfamily="STIXGeneral")
     bar.ax.tick_params(labelsize=7.5, width=0.6, length=3.0, labelfontfamily="STIXGeneral")
     bar.outline.set_linewidth(0.6)  # pyright: ignore[reportCallIssue]
-    bar.set_label("growth rate", fontsize=8.5, fontfamily="STIXGeneral")
+    bar.set_label(f"growth rate{style.unit('growth', scales)}", fontsize=8.5, fontfamily="STIXGeneral")
 
 
 def _halves(largest: float) -> Any:

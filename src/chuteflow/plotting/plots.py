@@ -19,7 +19,7 @@ from chuteflow.io.writing import require_writable, write_whole
 from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.flow import Flow
+from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
@@ -73,6 +73,18 @@ def plot_flows(flow_set: FlowSet, *, scales: Scales | None = None) -> Figure:
         ax.set_ylim(0.0, top * factor("height", chute, scales))
     style.caption(figure, parameters(chute))
     style.legend(figure, handles=axes[0].get_lines(), loc="outside lower center")
+    return figure
+
+
+@style.own_settings()
+def plot_profile(profile: Profile) -> Figure:
+    """Volume fraction, temperature and velocity of one profile against height."""
+    figure, axes = style.panels(3, height=2.7, shared_y=True)
+    height = np.ravel(profile.height)
+    for ax, field in zip(axes, _FIELDS, strict=True):
+        ax.plot(np.ravel(getattr(profile, field)), height, **style.stroke(0).line())
+        style.name_axes(ax, style.label(field), style.label("height") if ax is axes[0] else None)
+        ax.set_xlim(left=0.0)
     return figure
 
 

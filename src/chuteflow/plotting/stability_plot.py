@@ -9,9 +9,11 @@ import numpy as np
 
 from chuteflow.branches.results import FlowSet
 from chuteflow.io import words
+from chuteflow.io.contract import factor
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
 from chuteflow.stability.answers import Answer
+from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,24 +30,26 @@ _NOTHING = 1e-9
 
 
 @style.own_settings()
-def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
+def plot_modes(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
         reasons = [answer.reason for answer in answers if answer.reason]
         return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
+    unit = style.unit("growth", scales)
+    length, rate = (factor(name, flows.chute, scales) for name in ("height", "growth"))
     figure, axes = style.panels(2, len(drawn), width=7.2, height=0.5 + 2.7 * len(drawn))
     for row, answer in enumerate(drawn):
         mode = answer.modes[0]
         left, right = axes[2 * row], axes[2 * row + 1]
         top = min(1.4 * answer.flow.depth, float(mode.height[0]))
-        _profiles(left, mode, top)
+        _profiles(left, mode, top, length, scales)
         if mode.direction == "uniform":
             right.set_axis_off()
         else:
-            _section(right, mode, top)
+            _section(right, mode, top, length, scales)
         left.set_title(
-            f"{words.among(answer.flow, flows)}: {mode.kind}, growth {mode.growth:.3g}",
+            f"{words.among(answer.flow, flows)}: {mode.kind}, growth {rate * mode.growth:.3g}{unit}",
             loc="right",
             **style.title(),
         )
@@ -53,7 +57,7 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     return figure
 
 
-def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
+def plot_budgets(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
     """The energy budget of the leading mode of each flow: bars of the terms, that add up to the growth rate."""
     from chuteflow.stability.budget import TERMS
 
@@ -63,11 +67,12 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
         return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
     figure, axes = style.panels(1, len(drawn), width=7.2, height=0.6 + 2.9 * len(drawn))
     names = list(TERMS)
+    rate = factor("growth", flows.chute, scales)
     places = np.arange(len(names), 0, -1)
     for ax, answer in zip(axes, drawn, strict=True):
         budget = answer.budget
         assert budget is not None  # as there are modes
-        rates = np.array([[term.kinetic, term.density, term.thermal] for term in budget.terms])
+        rates = rate * np.array([[term.kinetic, term.density, term.thermal] for term in budget.terms])
         # Parts of one sign are put end to end, on their side of zero.
         for sign in (1.0, -1.0):
             parts = np.where(sign * rates > 0.0, rates, 0.0)
@@ -79,10 +84,10 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
             rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total"
         )
         ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
-        ax.axvline(budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
+        ax.axvline(rate * budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
         ax.set_yticks(places, names)
-        style.name_axes(ax, "rate of the energy of the mode, over twice the energy", "")
-        title = f"{words.among(answer.flow, flows)}: {budget.mode.kind}, growth {budget.mode.growth:.3g}"
+        style.name_axes(ax, f"rate of the energy of the mode, over twice the energy{style.unit('growth', scales)}", "")
+        title = f"{words.among(answer.flow, flows)}: {budget.mode.kind}, growth {rate * budget.mode.growth:.3g}"
         ax.set_title(title, loc="right", **style.title())
     style.caption(figure, parameters(flows.chute))
     handles, labels = axes[0].get_legend_handles_labels()
@@ -90,7 +95,7 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer]) -> Figure:
     return figure
 
 
-def _profiles(ax: Axes, mode: Mode, top: float) -> None:
+def _profiles(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:
     height, disturbed = mode.sampled()
     fields = np.abs(disturbed)
     velocity = fields[1:4].max()
@@ -98,13 +103,13 @@ def _profiles(ax: Axes, mode: Mode, top: float) -> None:
     for i, (name, values) in enumerate(zip(_NAMES, fields, strict=True)):
         size = values[shown].max()
         if size > _NOTHING * velocity:
-            ax.plot(values[shown] / size, height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
-    ax.set_ylim(0.0, top)
-    style.name_axes(ax, "modulus over its largest, as listed", style.label("height"))
+            ax.plot(values[shown] / size, length * height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
+    ax.set_ylim(0.0, length * top)
+    style.name_axes(ax, "modulus over its largest, as listed", style.label("height", scales))
     style.legend(ax, loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
 
 
-def _section(ax: Axes, mode: Mode, top: float) -> None:
+def _section(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:
     """Density (shaded where it is higher) and velocity in the plane of the wave, over one wavelength."""
     phase = np.linspace(0.0, 2.0 * np.pi, _PHASES)
     height, (nu, u, v, w, _) = mode.sampled()
@@ -113,16 +118,23 @@ def _section(ax: Axes, mode: Mode, top: float) -> None:
     levels = np.linspace(0.0, top, 121)
     density = np.real(_at(levels, height, nu)[:, None] * np.exp(1j * phase))
     largest = np.abs(density).max() or 1.0
-    ax.contourf(phase / k, levels, density / largest, levels=np.linspace(-1.0, 1.0, _SHADES), cmap="RdBu_r", alpha=0.75)
+    ax.contourf(
+        length * phase / k,
+        length * levels,
+        density / largest,
+        levels=np.linspace(-1.0, 1.0, _SHADES),
+        cmap="RdBu_r",
+        alpha=0.75,
+    )
     across, up = np.linspace(0.0, 2.0 * np.pi, _ARROWS[0] + 2)[1:-1], np.linspace(0.0, top, _ARROWS[1] + 2)[1:-1]
     waves = np.exp(1j * across)
     along, rising = (np.real(_at(up, height, f)[:, None] * waves) for f in (forward, w))
     # On the page a wavelength and the depth are of one size, whatever they are in grain diameters.
     stretch = (2.0 * np.pi / k) / top
-    ax.quiver(across / k, up, along / stretch, rising, color=style.BLACK, width=0.0035, pivot="mid")
+    ax.quiver(length * across / k, length * up, along / stretch, rising, color=style.BLACK, width=0.0035, pivot="mid")
     which = {"along": "$x$", "across": "$y$", "oblique": "the wave"}[mode.direction]
-    ax.set_ylim(0.0, top)
-    style.name_axes(ax, f"distance along {which}", style.label("height"))
+    ax.set_ylim(0.0, length * top)
+    style.name_axes(ax, f"distance along {which}{style.unit('height', scales)}", style.label("height", scales))
     title = "density disturbance (red more) and motion"
     ax.set_title(title, loc="right", **style.title())
 

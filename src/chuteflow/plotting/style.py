@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chuteflow.steady.quantities import QUANTITIES, Scales
+from chuteflow.steady.quantities import SCALED, Scales
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -139,11 +139,16 @@ def inset(ax: Axes, place: tuple[float, float, float, float]) -> Axes:
 
 def label(name: str, scales: Scales | None = None) -> str:
     """The label of an axis from the registry of quantities, with the unit where there are scales."""
-    quantity = QUANTITIES[name]
+    quantity = SCALED[name]
     # A name in code has no hyphen.
     name = name.replace("_", " ").replace("holdup", "hold-up")
-    words = f"{name}, ${quantity.latex}$"
-    return words if scales is None or quantity.unit == "1" else f"{words} ({printed(quantity.unit)})"
+    return f"{name}, ${quantity.latex}${unit(quantity.name, scales)}"
+
+
+def unit(name: str, scales: Scales | None) -> str:
+    """The unit of a quantity in brackets, with a space before; nothing without scales or unit."""
+    quantity = SCALED[name]
+    return "" if scales is None or quantity.unit == "1" else f" ({printed(quantity.unit)})"
 
 
 def name_axes(ax: Axes, x: str | None, y: str | None) -> None:

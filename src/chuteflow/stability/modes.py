@@ -12,7 +12,7 @@ the coarse grid is followed to the finest, until it is a mode, or is gone, or ke
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
+from chuteflow.result import Compared
 from chuteflow.stability.base import Base, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
@@ -66,7 +67,7 @@ class UnresolvedError(SolveError):
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class Mode(Compared):
     """A disturbance exp(``sigma`` t + i (kx x + ky y)) of ``flow``; ``error`` is the estimated one of sigma.
 
     Rates are in sqrt(g cos(theta)/d), wavenumbers in 1/d.
@@ -77,7 +78,7 @@ class Mode:
     ky: float
     sigma: complex
     error: float
-    operator: Operator
+    operator: Operator = field(compare=False)
     vector: Complex
 
     def __repr__(self) -> str:

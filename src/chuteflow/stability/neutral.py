@@ -24,6 +24,7 @@ from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import Control, Point, closes, trace
 from chuteflow.numerics.eigenproblem import Complex, refined
+from chuteflow.result import Compared
 from chuteflow.stability.modes import Disturbances
 
 #: Steps of the central differences that give the slope of sigma: Newton's method does with few digits of it.
@@ -79,7 +80,7 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False)
-class NeutralCurve:
+class NeutralCurve(Compared):
     """Points z (n, 2) of a neutral curve with frequencies -Im sigma and errors (n,), in order; why it ends.
 
     ``error`` is the estimated distance from the true curve, in the coordinates of the plane.

@@ -17,6 +17,7 @@ from chuteflow import display
 from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.result import Result
 from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
@@ -120,7 +121,7 @@ def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent)
 
 
 @dataclass(frozen=True, eq=False)
-class WaveMap:
+class WaveMap(Result):
     """Growth rates and frequencies (m, n) of the leading modes of ``flow`` over ``kx`` (m,) and ``ky`` (n,), in 1/d.
 
     NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n): there the
@@ -142,9 +143,12 @@ class WaveMap:
         reach = (display.span("kx", self.kx), display.span("ky", self.ky), display.span("growth", self.growth.flat))
         return display.line("WaveMap", *reach, display.counted(len(self.neutral), "neutral curve"))
 
+    def _repr_html_(self) -> str:
+        return display.html_table(repr(self)[1:-1], _HEADER, _rows(self.neutral))
+
 
 @dataclass(frozen=True, eq=False)
-class FamilyMap:
+class FamilyMap(Result):
     """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a family.
 
     ``depth_wavenumber`` (m,) is k h with h the centre of mass, and ``flows`` (n) are those of the columns. NaN,
@@ -168,6 +172,20 @@ class FamilyMap:
         reach = (display.span("k h", self.depth_wavenumber), display.span("growth", self.growth.flat))
         flows, curves = display.counted(len(self.flows), "flow"), display.counted(len(self.neutral), "neutral curve")
         return display.line("FamilyMap", f"{flows}, waves at {self.angle:g} degrees", *reach, curves)
+
+    def _repr_html_(self) -> str:
+        return display.html_table(repr(self)[1:-1], _HEADER, _rows(self.neutral))
+
+
+#: Columns of a table of neutral curves.
+_HEADER = ["neutral curve", "points", "begins", "", "ends", "", "why it ends"]
+
+
+def _rows(curves: Sequence[NeutralCurve]) -> list[list[str]]:
+    return [
+        [str(i), str(len(c.z)), *(display.number(v) for z in (c.z[0], c.z[-1]) for v in z), c.ends[1]]
+        for i, c in enumerate(curves, 1)
+    ]
 
 
 @on_one_thread

@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import Radau
 
+from chuteflow import display
 from chuteflow.branches.enumeration import flows
 from chuteflow.checks import number
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.result import Compared, Result
 from chuteflow.stability.layer import FIELDS, Layer
 from chuteflow.stability.modes import Disturbances, UnresolvedError, leading
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.quantities import SCALED
 from chuteflow.threads import on_one_thread
 
 #: Relative error of a step in time.
@@ -25,7 +28,7 @@ _COLD, _PACKED = 1e-4, 0.995
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class Moment(Compared):
     """A state on the way, with its time, Q, h, and T at the surface and at the base."""
 
     time: float
@@ -37,7 +40,7 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class Outcome(Compared):
     """Which steady flow of the same hold-up a moving one has come to, or whether it was ``arrested``.
 
     ``distance`` is the largest relative difference in Q, h and T at the base from the nearest of ``steady``, and
@@ -54,6 +57,28 @@ class Outcome:
     rate: float
     arrested: bool
     leading: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation(Result):
+    """A disturbed ``flow`` followed in time: the ``moments`` that the integration came by, the first of them the start,
+    and the steady flow that it has come to."""
+
+    flow: Flow
+    moments: tuple[Moment, ...]
+    outcome: Outcome
+
+    def __repr__(self) -> str:
+        end = self.outcome
+        came = "at rest" if end.arrested else None if end.nearest is None else f"{100.0 * end.distance:.2g} % away from"
+        target = None if end.nearest is None or end.arrested else f"{came} {end.steady[end.nearest].name}"
+        moments = display.counted(len(self.moments), "moment")
+        return display.line("Relaxation", moments, target or came, t=self.moments[-1].time)
+
+    def _repr_html_(self) -> str:
+        names = ("time", "mass_flux", "centre_of_mass", "surface_temperature", "base_temperature")
+        rows = [[display.number(getattr(moment, name)) for name in names] for moment in self.moments]
+        return display.html_table(repr(self)[1:-1], [SCALED[name].symbol for name in names], rows)
 
 
 def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERANCE) -> Iterator[Moment]:

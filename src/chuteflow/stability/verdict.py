@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.result import Result
 from chuteflow.stability.modes import (
     TOLERANCE,
     Disturbances,
@@ -43,7 +44,7 @@ RANGE, _SHORTEST = (1e-3, 10.0), np.pi
 
 
 @dataclass(frozen=True, eq=False)
-class Stability:
+class Stability(Result):
     """Whether ``flow`` is stable, and its ``mode`` of largest growth among those that were looked at.
 
     ``stable`` is True or False only if ``complete``: if all directions and all k in ``searched`` (1/d) were searched,

@@ -60,10 +60,7 @@ class Chute:
         Raises:
             InputError: for an angle out of range.
         """
-        angle = number("angle", degrees)
-        if not 0.0 < angle < 90.0:
-            raise InputError(f"angle = {angle} degrees: must be above 0 and below 90")
-        return cls(slope=math.tan(math.radians(angle)), **others)
+        return cls(slope=slope_of(degrees), **others)
 
     @property
     def angle(self) -> float:
@@ -91,3 +88,15 @@ class Chute:
             del values["base"]
             return values
         return values | {"base": str(on)}
+
+
+def slope_of(degrees: Any) -> float:
+    """tan(theta) of an inclination in degrees.
+
+    Raises:
+        InputError: for an angle that is not above 0 and below 90.
+    """
+    angle = number("angle", degrees)
+    if not 0.0 < angle < 90.0:
+        raise InputError(f"angle = {angle} degrees: must be above 0 and below 90")
+    return math.tan(math.radians(angle))

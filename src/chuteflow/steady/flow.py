@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +16,7 @@ from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, interpolation_matrix
 from chuteflow.numerics.roots import secants
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stretch_map, stretch_position
 from chuteflow.steady.kinds import density_kind, interior_kind
@@ -45,7 +47,7 @@ _SMALLEST_SHARE = 1e-260
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Result):
     """Fields at given heights, arrays of one shape; dimensionless, see chuteflow.steady.quantities.FIELDS.
 
     The normal stress is the weight of the grains above (3.2), (3.4), and the shear stress tan(theta) times that
@@ -98,7 +100,7 @@ class EnergyBudget:
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class Flow(Result):
     """A steady, fully developed flow on ``chute``.
 
     All numbers are dimensionless (lengths in grain diameters d, velocities in sqrt(g d cos theta),
@@ -119,6 +121,13 @@ class Flow:
         rows.append(("error", display.number(self.error), "estimated relative error of Q, h and M, the largest"))
         kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
         return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
+
+    def _compared(self) -> tuple[object, ...]:
+        solution = self.solution
+        return self.chute, solution.macroscopic, solution.error, solution.status.name
+
+    def _mark(self) -> bytes:
+        return self.solution.macroscopic.tobytes()
 
     @property
     def name(self) -> str:
@@ -202,6 +211,31 @@ class Flow:
             else:
                 high = middle
         return float(np.exp(0.5 * (low + high)))
+
+    @property
+    def mean_velocity(self) -> float:
+        """Q/M, the velocity of the grains averaged over their mass."""
+        return self.mass_flux / self.mass_holdup
+
+    @property
+    def surface_velocity(self) -> float:
+        """u far above (half-line) or at the interface."""
+        return float(self._antiderivatives[1][0])
+
+    @property
+    def mean_volume_fraction(self) -> float:
+        """nu averaged over heights from the base to the depth."""
+        return self.mass_holdup * (1.0 - self._share_above_depth) / self.depth
+
+    @property
+    def froude_number(self) -> float:
+        """Mean velocity over sqrt(g cos(theta) depth)."""
+        return self.mean_velocity / math.sqrt(self.depth)
+
+    @property
+    def angle(self) -> float:
+        """Inclination of the chute in degrees."""
+        return self.chute.angle
 
     @cached_property
     def interior(self) -> str:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from chuteflow import display
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError, SolveError
+from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.kinds import INVERTED, MONOTONIC, interior_kind
 from chuteflow.theory.bases import require_richman
@@ -33,7 +34,7 @@ from chuteflow.theory.hot import (
 
 
 @dataclass(frozen=True)
-class HotModel:
+class HotModel(Result):
     """The hot flow of ``chute``: its limit T_inf -> infinity, from which its numbers differ by O(1/T_inf).
 
     Where there is none, ``solution`` and all numbers of the flow are None, and ``reason`` says why in one
@@ -53,6 +54,10 @@ class HotModel:
             return display.line("HotModel", self.reason, **numbers)
         density = INVERTED if self.inverted else MONOTONIC
         return display.line("HotModel", f"{self.interior}, density {density}", **numbers, M=self.mass_holdup)
+
+    def _repr_html_(self) -> str:
+        rows = [[name, "-" if value is None else str(value)] for name, value in self.as_dict().items()]
+        return display.html_table(repr(self)[1:-1], ["", ""], rows)
 
     @property
     def exists(self) -> bool:

@@ -26,6 +26,11 @@ class Quantity:
     equation: str
     description: str
 
+    @property
+    def unit_without_scales(self) -> str:
+        """Its unit where it is over its scale: "1", but for what has none."""
+        return "1" if any(self.dimension) else self.unit
+
 
 #: Fields over height, attributes of a profile.
 FIELDS: dict[str, Quantity] = {
@@ -140,6 +145,35 @@ NUMBERS: dict[str, Quantity] = {
             "section 3.7",
             "height of the interface (infinite on the half-line)",
         ),
+        Quantity("mean_velocity", "U", "U", (0, 0.5, 0.5), "m/s", "Q/M", "mean velocity of the grains, Q/M"),
+        Quantity(
+            "surface_velocity",
+            "u_surface",
+            r"u_{\mathrm{surface}}",
+            (0, 0.5, 0.5),
+            "m/s",
+            "(3.10)",
+            "velocity far above, or at the interface",
+        ),
+        Quantity(
+            "mean_volume_fraction",
+            "nu_mean",
+            r"\bar\nu",
+            (0, 0, 0),
+            "1",
+            "",
+            "mean volume fraction from the base to the depth",
+        ),
+        Quantity(
+            "froude_number",
+            "Fr",
+            r"\mathrm{Fr}",
+            (0, 0, 0),
+            "1",
+            "",
+            "mean velocity over sqrt(g cos(theta) depth)",
+        ),
+        Quantity("angle", "angle", r"\theta", (0, 0, 0), "degree", "section 2", "inclination of the chute"),
     )
 }
 
@@ -189,7 +223,21 @@ VALIDITY: dict[str, Quantity] = {
     )
 }
 
+#: What disturbances of a flow are measured in.
+DISTURBANCES: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        Quantity("time", "t", "t", (0, 0.5, -0.5), "s", "section 3.1", "time"),
+        Quantity("wavenumber", "k", "k", (0, -1, 0), "1/m", "", "wavenumber of a disturbance"),
+        Quantity("growth", "growth", r"\sigma", (0, -0.5, 0.5), "1/s", "", "growth rate of a disturbance"),
+        Quantity("frequency", "frequency", r"\omega", (0, -0.5, 0.5), "1/s", "", "angular frequency of a disturbance"),
+        Quantity("wave_speed", "speed", "c", (0, 0.5, 0.5), "m/s", "", "speed of the crests of a disturbance"),
+    )
+}
+
 QUANTITIES: dict[str, Quantity] = FIELDS | NUMBERS
+#: All that has a scale.
+SCALED: dict[str, Quantity] = QUANTITIES | DISTURBANCES
 
 
 @dataclass(frozen=True)
@@ -220,8 +268,8 @@ class Scales:
         Raises:
             InputError: for an unknown quantity.
         """
-        if name not in QUANTITIES:
-            raise InputError(f"unknown quantity {name!r}: choose one of {', '.join(QUANTITIES)}")
-        of_density, of_diameter, of_acceleration = QUANTITIES[name].dimension
+        if name not in SCALED:
+            raise InputError(f"unknown quantity {name!r}: choose one of {', '.join(SCALED)}")
+        of_density, of_diameter, of_acceleration = SCALED[name].dimension
         acceleration = self.gravity / math.hypot(1.0, slope)
         return self.density**of_density * self.diameter**of_diameter * acceleration**of_acceleration

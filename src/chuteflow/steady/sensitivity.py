@@ -96,6 +96,7 @@ class _Moved(Flow):
                 flow.mass_flux / flow.mass_holdup / np.sqrt(flow.depth) * (log_q - log_m - 0.5 * depth / flow.depth)
             ),
         }
+        found["angle"] = float(derivative(np.arctan(np.complex128(self._model.slope)))) * 180.0 / np.pi
         return {name: float(found[name]) for name in NUMBERS}
 
     def _depth(self, start: _Start, log_largest: float) -> tuple[float, float]:

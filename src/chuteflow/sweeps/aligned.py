@@ -20,7 +20,7 @@ class Aligned:
         """The entries ``which``, by a mask or by indices."""
         return self._made({name: of[:, which] if axis else of[which] for name, axis, of in self._arrays()})
 
-    def and_all(self, others: Sequence[Self]) -> Self:
+    def and_all(self, others: Sequence[Aligned]) -> Self:
         """These entries, and after them those of the ``others``."""
         return self._made(
             {

@@ -20,7 +20,7 @@ from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
-from chuteflow.sweeps.numbers import KINDS, numbers
+from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, numbers
 from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
 from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
@@ -197,8 +197,10 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    are judged, or the law has breaks, at which integration in a batch would lose its order."""
-    if not len(batch) or wanted(study.quantities) or not batch.law.smooth:
+    are judged or asked for what is not carried along, or the law has breaks, at which integration in a batch would
+    lose its order."""
+    singly = wanted(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
+    if not len(batch) or singly or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:

@@ -21,6 +21,8 @@ KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES
 _ACCURACY = Accuracy(1e-10, 1e-7)
 #: Net loss within this of zero, in its largest value on the way, decides nothing.
 _DECIDES = 1e-9
+#: Quantities that are not carried along side by side: studies that ask for them are solved one by one.
+ONE_BY_ONE = ("surface_velocity", "mean_volume_fraction")
 
 
 def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
@@ -34,6 +36,8 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
         "base_temperature": lambda: of.along(flows.state).temperature,
         "base_volume_fraction": lambda: of.along(flows.state).nu,
         "slip_velocity": lambda: _slip(of.along(flows.state)),
+        "mean_velocity": lambda: _mean_velocity(flows),
+        "angle": lambda: np.degrees(np.arctan(of.slope)),
     }
     out: dict[str, Array] = {name: value() for name, value in plain.items() if name in names}
     rest = set(names) - set(plain)
@@ -43,6 +47,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
             "largest_volume_fraction": lambda: inside.largest,
             "depth": lambda: inside.depth,
             "interface_height": lambda: inside.top,
+            "froude_number": lambda: _mean_velocity(flows) / np.sqrt(inside.depth),
             "interior": lambda: inside.interior,
             "density": lambda: inside.inverted,
         }
@@ -54,6 +59,10 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
 
 def _slip(at: Along) -> Array:
     return at.slip * np.sqrt(at.temperature)
+
+
+def _mean_velocity(flows: Flows) -> Array:
+    return np.exp(flows.macroscopic[LOG_Q] - flows.macroscopic[LOG_M])
 
 
 class Inside:

@@ -173,7 +173,7 @@ def _number(name: str) -> Variable:
     quantity = NUMBERS[name]
     attributes = {
         "long_name": quantity.description,
-        "units": "1",
+        "units": quantity.unit_without_scales,
         "symbol": quantity.symbol,
         "comment": f"{quantity.equation} of the paper",
         "ancillary_variables": "error status",

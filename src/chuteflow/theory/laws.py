@@ -61,6 +61,11 @@ def law(asked: str | Law) -> Law:
     return found.configured(**values)
 
 
+def closures() -> dict[str, Law]:
+    """The constitutive laws that there are, by the names that :class:`chuteflow.Chute` takes as its closure."""
+    return dict(known_laws())
+
+
 def settings_added(asked: str, settings: tuple[str, ...]) -> str:
     """The text ``asked`` with more ``settings``, each KEY=VALUE.
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.bifurcations.boundary import Boundary, BoundarySet
+    from chuteflow.steady.quantities import Scales
 
 #: The numbers that can stand on the vertical axis, by their symbols.
 _UPRIGHT = {NUMBERS[name].symbol: name for name in PLACE}
@@ -53,15 +54,16 @@ class Plane(click.ParamType):
 )
 @options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
 @options.range_options("where it is the second parameter")
-@options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.closure_options
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options
-@options.output_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Follow, print, save and draw."""
     second, upright = given["plane"] or ("slope", "Q")
     bounds, chute = _chute(given, second)
+    scales = options.scales(given)
+    slope = None if second == "slope" else chute.slope
+    search = options.search(given, slope, scales)
     options.require_outputs(given)
     from chuteflow.bifurcations.boundary import boundary
 
@@ -73,26 +75,26 @@ def command(**given: Any) -> None:
             bounds=bounds,
             progress=lambda what, share: progress.tell(f"{what}, {share:.0%} of the range"),
             **chosen,
-            **options.search(given),
+            **search,
         )
     if given["as_json"]:
         from chuteflow.io import contract
         from chuteflow.io.boundary_records import boundaries_object
 
-        answer = contract.text(boundaries_object(found))
+        answer = contract.text(boundaries_object(found, scales))
     else:
-        answer = "\n".join(_report(found, second))
+        answer = "\n".join(_report(found, second, scales))
 
     def save(path: str) -> None:
         from chuteflow.io import boundary_records
 
-        boundary_records.save(found, path)
+        boundary_records.save(found, path, scales=scales)
 
     def plotted() -> Figure:
         from chuteflow.bifurcations.diagram import diagram
         from chuteflow.plotting.boundary_plot import plot_boundaries, plot_none
 
-        return plot_boundaries(diagram(found, _UPRIGHT[upright])) if len(found) else plot_none(found)
+        return plot_boundaries(diagram(found, _UPRIGHT[upright]), scales=scales) if len(found) else plot_none(found)
 
     options.deliver(given, answer, save, plotted)
 
@@ -116,24 +118,26 @@ def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], 
     return bounds, options.chute({**given, second: bounds[0]})
 
 
-def _report(found: BoundarySet, second: str) -> Iterator[str]:
+def _report(found: BoundarySet, second: str, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
 
     yield f"{found.kind} through {second} from {found.bounds[0]:g} to {found.bounds[1]:g}"
     others = {key: getattr(found.chute, parameter.name) for key, parameter in BY_KEY.items() if key != second}
     said = ", ".join(f"{name} = {value:g}" for name, value in others.items())
     yield f"chute: {said}, surface {found.chute.surface}, {found.chute.laws}"
+    if scales is not None:
+        yield words.scales(scales)
     for i, boundary in enumerate(found, 1):
         yield ""
         yield f"boundary {i} of {len(found)}, {len(boundary.flows)} points"
-        yield _points(boundary, second)
+        yield _points(boundary, second, scales)
     yield ""
     if found.reason:
         yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
-    yield words.searched(found.searched, found.chute, None)
+    yield words.in_own_units(words.searched(found.searched, found.chute, None), scales)
     yield (
         f"entered at {len(found.sampled)} values of {second}: a boundary between two of them, which the flows at "
         "neither come near, could be missed"
@@ -144,7 +148,7 @@ def _report(found: BoundarySet, second: str) -> Iterator[str]:
         yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 
 
-def _points(boundary: Boundary, second: str) -> str:
+def _points(boundary: Boundary, second: str, scales: Scales | None) -> str:
     """Both ends and the turning points of a boundary as a table."""
     from chuteflow.bifurcations.tracing import TURNS
     from chuteflow.io import contract, tables
@@ -154,14 +158,17 @@ def _points(boundary: Boundary, second: str) -> str:
         *((turn.kind, turn.flow, TURNS[turn.kind]) for turn in boundary.special),
         ("ends", boundary.flows[-1], boundary.ends[1]),
     ]
-    (symbols,) = tables.heading(contract.PLACE, None)
+    header = [
+        [*start, *cells, ""]
+        for start, cells in zip((("", second), ("", "[1]")), tables.heading(contract.PLACE, scales), strict=False)
+    ]
     rows = [
         [
             kind,
             tables.number(getattr(flow.chute, boundary.second)),
-            *tables.numbers(flow, contract.PLACE, flow.chute, None),
+            *tables.numbers(flow, contract.PLACE, flow.chute, scales),
             what,
         ]
         for kind, flow, what in chosen
     ]
-    return tables.table([["", second, *symbols, ""], *rows], words=(0, len(symbols) + 2))
+    return tables.table([*header, *rows], words=(0, len(contract.PLACE) + 2))

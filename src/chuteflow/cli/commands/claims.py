@@ -36,7 +36,8 @@ _VERDICT_WIDTH, _GAP, _NARROWEST, _WIDEST = 13, 2, 72, 140
 @click.option("--list", "listed", is_flag=True, help="List ids and statements, and compute nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON list.")
 @options.option("--out", metavar="FILE", help="Write to FILE, .json or .txt, what would be printed.")
-def command(only: str | None, section: str | None, listed: bool, as_json: bool, out: str | None) -> None:
+@options.quiet_option
+def command(only: str | None, section: str | None, listed: bool, as_json: bool, out: str | None, quiet: bool) -> None:
     """Choose, compute, and print or write."""
     from chuteflow.paper.claims import CLAIMS, check
 

@@ -22,6 +22,7 @@ _EPILOG = (
 )
 #: Restitution and slope at which the functions of a law are shown unless others are given.
 _E, _SLOPE = 0.8, 0.3
+_SAVED = (".csv", ".json")
 #: Volume fractions of the table.
 _DENSITIES = (0.01, 0.1, 0.2, 0.3, 0.4, 0.49, 0.55, 0.6)
 
@@ -31,14 +32,13 @@ _DENSITIES = (0.01, 0.1, 0.2, 0.3, 0.4, 0.49, 0.55, 0.6)
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="A parameter of the closure.")
 @options.option("--e", type=options.Number(), help="Restitution at which its functions are shown; 0.8 by default.")
 @options.option("--slope", type=options.Number(), help="Slope tan(theta) for laws that know it; 0.3 by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw g0 to g6 beside Lun's into FILE: .png, .pdf or .svg.")
+@options.output_options(_SAVED, "g0 to g6 beside Lun's")
 def command(name: str | None, **given: Any) -> None:
     """List the laws, or print and draw one."""
     from chuteflow.io import contract
 
     if name is None:
-        for option in ("plot", "e", "slope", "settings"):
+        for option in ("plot", "save", "e", "slope", "settings"):
             if given[option]:
                 raise InputError(f"--{'set' if option == 'settings' else option} needs the NAME of a closure")
         click.echo(contract.text(_everything()) if given["as_json"] else "\n".join(_list()))
@@ -49,15 +49,24 @@ def command(name: str | None, **given: Any) -> None:
     chosen = law(settings_added(name, given["settings"]))
     e, slope = given["e"] or _E, given["slope"] or _SLOPE
     require_positive(chosen, e, slope)
-    options.require_outputs({"save": None, **given})
-    answer = contract.text(_whole(chosen, e, slope)) if given["as_json"] else "\n".join(_report(chosen, e, slope))
+    options.require_ratio(slope)
+    options.require_outputs(given, _SAVED)
+    whole = _whole(chosen, e, slope)
 
     def plotted() -> Figure:
         from chuteflow.plotting.closure_plot import plot_laws
 
         return plot_laws([law("lun"), chosen] if str(chosen) != "lun" else [chosen], e, slope)
 
-    options.deliver({"save": None, **given}, answer, lambda _: None, plotted)
+    options.deliver_object(given, whole, _report(chosen, e, slope), lambda: _rows(whole), plotted)
+
+
+def _rows(whole: dict[str, Any]) -> Iterator[list[str]]:
+    """The functions at each volume fraction as rows of CSV."""
+    yield ["nu", *whole["functions"]]
+    for i, nu in enumerate(whole["nu"]):
+        values = (column[i] for column in whole["functions"].values())
+        yield [repr(nu), *("" if value is None else repr(value) for value in values)]
 
 
 def _everything() -> dict[str, Any]:

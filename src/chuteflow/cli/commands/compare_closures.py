@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.branches.results import FlowSet
+    from chuteflow.steady.quantities import Scales
 
 _EPILOG = (
     "Example: chuteflow compare-closures --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 "
@@ -35,38 +36,53 @@ _COLUMNS = ("centre_of_mass", "mass_holdup", "surface_temperature", "base_volume
 )
 @options.condition_options
 @options.search_options
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw Q-h curves and profiles into FILE: .png, .pdf or .svg.")
+@options.output_options((".csv", ".json"), "Q-h curves and profiles")
 def command(**given: Any) -> None:
     """Solve the chute with each, print and draw."""
-    if given["closure"] is not None or given["settings"]:
+    if click.get_current_context().params["closure"] is not None or given["settings"]:
         raise InputError("compare-closures takes the closures by --with, such as --with lun --with extended")
     chute = options.chute(given)
-    condition = options.condition(given, chute, None)
-    options.require_outputs({"save": None, **given})
+    scales = options.scales(given)
+    condition = options.condition(given, chute, scales)
+    options.require_outputs(given, (".csv", ".json"))
     from dataclasses import replace
 
     from chuteflow.branches.enumeration import flows
 
     # Every chute is checked before anything is computed.
     chutes = [replace(chute, closure=name) for name in _names(given["closures"])]
-    search = options.search(given)
+    search = options.search(given, chute.slope, scales)
     found = [flows(one, **condition, **search) for one in chutes]
-    if given["as_json"]:
-        from chuteflow.io import contract
-
-        sets = [contract.flow_set_object(flow_set) for flow_set in found]
-        answer = contract.text({"chute": _without_closure(sets[0]["chute"]), "closures": sets})
-    else:
-        answer = "\n".join(_report(found))
 
     def plotted() -> Figure:
         from chuteflow.branches.curve import curve
         from chuteflow.plotting.closure_plot import plot_comparison
 
-        return plot_comparison(found, [curve(one, **search) for one in chutes])
+        return plot_comparison(found, [curve(one, **search) for one in chutes], scales=scales)
 
-    options.deliver({"save": None, **given}, answer, lambda _: None, plotted)
+    content = _content(found, scales)
+    options.deliver_object(given, content, _report(found, scales), lambda: _rows(content), plotted)
+
+
+def _content(found: Sequence[FlowSet], scales: Scales | None) -> dict[str, Any]:
+    from chuteflow.io import contract
+
+    sets = [contract.flow_set_object(flow_set, scales) for flow_set in found]
+    return {"chute": _without_closure(sets[0]["chute"]), "closures": sets}
+
+
+def _rows(content: dict[str, Any]) -> Iterator[list[str]]:
+    """Every flow under every law as a row of CSV."""
+    from chuteflow.steady.quantities import NUMBERS
+
+    symbols = [quantity.symbol for quantity in NUMBERS.values()]
+    yield ["closure", *symbols, "error"]
+    for one in content["closures"]:
+        # A name with commas is a cell in quotes.
+        name = one["chute"]["closure"]
+        for flow in one["flows"]:
+            cells = (flow[symbol] for symbol in (*symbols, "error"))
+            yield [f'"{name}"', *("" if cell is None else repr(cell) for cell in cells)]
 
 
 def _names(given: Sequence[str]) -> list[str]:
@@ -84,24 +100,30 @@ def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in chute.items() if name != "closure"}
 
 
-def _report(found: Sequence[FlowSet]) -> Iterator[str]:
+def _report(found: Sequence[FlowSet], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
     yield words.chute(found[0].chute).rpartition(", closure")[0]
+    if scales is not None:
+        yield words.scales(scales)
     yield ""
-    header = ["closure", *tables.heading(("mass_flux", *_COLUMNS), None)[0], "error", "validity"]
+    ends = (("closure", "error", "validity"), ("", "[1]", ""))
+    header = [
+        [first, *cells, error, validity]
+        for (first, error, validity), cells in zip(ends, tables.heading(("mass_flux", *_COLUMNS), scales), strict=False)
+    ]
     rows: list[list[str]] = []
     for flow_set in found:
         name = str(flow_set.chute.closure)
         if not len(flow_set):
-            rows.append([name, *[""] * (len(header) - 2), "no flow"])
+            rows.append([name, *[""] * (len(header[0]) - 2), "no flow"])
         for flow in flow_set:
-            cells = tables.numbers(flow, ("mass_flux", *_COLUMNS), flow.chute, None)
+            cells = tables.numbers(flow, ("mass_flux", *_COLUMNS), flow.chute, scales)
             rows.append([name, *cells, f"{flow.error:.0e}", flow.validity.summary])
-    yield tables.table([header, *rows], words=(0, len(header) - 1))
+    yield tables.table([*header, *rows], words=(0, len(header[0]) - 1))
     yield ""
     for flow_set in found:
         if flow_set.reason:
-            yield f"{flow_set.chute.closure}: no flow: {flow_set.reason}"
+            yield f"{flow_set.chute.closure}: {words.in_own_units(f'no flow: {flow_set.reason}', scales)}"
         if flow_set.incomplete:
-            yield f"{flow_set.chute.closure}: there may be more: {flow_set.incomplete}"
+            yield f"{flow_set.chute.closure}: {words.in_own_units(f'there may be more: {flow_set.incomplete}', scales)}"

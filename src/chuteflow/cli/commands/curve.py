@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -28,8 +28,7 @@ _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6
 @click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
 @options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
 @options.search_options
-@options.output_options
-@options.scale_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Trace, print, save and draw."""
     chute = options.chute(given)
@@ -40,14 +39,15 @@ def command(**given: Any) -> None:
     from chuteflow.branches.curve import curve
 
     points = {} if given["points"] is None else {"points": given["points"]}
-    found = curve(chute, **points, **options.search(given))
+    found = curve(chute, **points, **options.search(given, chute.slope, scales))
+    near, lines = ({}, []) if found.branches else options.nearest(chute, {}, found.searched, scales)
     judged = _judged(found, given["samples"]) if given["stability"] else None
     if judged is not None:
         found = judged.curve
     if given["as_json"]:
         from chuteflow.io import contract
 
-        content = contract.curve_object(found, scales)
+        content = contract.curve_object(found, scales) | near
         if judged is not None:
             from chuteflow.io.stability_curve import changes_objects, samples_objects
 
@@ -56,7 +56,7 @@ def command(**given: Any) -> None:
                 branch["stability"], branch["stability_changes"] = samples, changes
         answer = contract.text(content)
     else:
-        answer = "\n".join(_report(found, judged, scales))
+        answer = "\n".join(_report(found, judged, lines, scales))
 
     def save(path: str) -> None:
         from chuteflow.io import files
@@ -80,7 +80,7 @@ def _judged(found: Curve, samples: int | None) -> MarkedCurve:
         return marked(found, progress=lambda share: progress.tell(f"{share:.0%} of the flows judged"), **chosen)
 
 
-def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> Iterator[str]:
+def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
 
     yield words.chute(found.chute)
@@ -98,6 +98,7 @@ def _report(found: Curve, judged: MarkedCurve | None, scales: Scales | None) -> 
         yield words.multiplicity(found, scales)
     else:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
     if found.incomplete:
         yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
     yield words.searched(found.searched, found.chute, scales)

@@ -30,6 +30,7 @@ _COLUMNS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature",
 @click.option("--want", metavar="NAME=VALUE", multiple=True, help="Another number of the flow, such as depth=10.")
 @click.option("--range", "ranges", type=Range(), multiple=True, help="Where an unknown parameter is tried.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.quiet_option
 def command(**given: Any) -> None:
     """Search and print."""
     unknown = [name.strip() for name in (given["unknown"] or "").split(",") if name.strip()]

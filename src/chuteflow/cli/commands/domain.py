@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from chuteflow.maps import Domain
     from chuteflow.steady.chute import Chute
+    from chuteflow.steady.quantities import Scales
 
 #: Processes at most, unless another number is asked for.
 _MOST_PROCESSES = 8
@@ -47,9 +48,14 @@ class Numbers(click.ParamType):
 
     name = "numbers"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...] | options.Amounts:
         """The numbers."""
-        return tuple(options.Number().convert(one, param, ctx) for one in str(value).split(","))
+        numbers, unit = options.without_unit(str(value))
+        texts = numbers.split(",")
+        found = tuple(options.Number().convert(one, param, ctx) for one in texts)
+        return options.Amounts(tuple(texts), unit, ",") if unit else found
 
 
 @click.command("domain", help=COMMANDS["domain"], epilog=_EPILOG)
@@ -59,22 +65,21 @@ class Numbers(click.ParamType):
 @options.option(
     "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )
-@options.option("--surface", metavar="NAME", help="Surface condition: free (the default) or interface.")
-@options.closure_options
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
-@options.output_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Map, print, save and draw."""
     x, y, chute = _plane(given)
+    scales = options.scales(given)
+    slope = None if "slope" in (x[0], y[0]) else chute.slope
+    temperatures = options.own(given, "temperature", "surface_temperature", slope, scales)
+    search = options.search(given, slope, scales)
     options.require_outputs(given)
     from chuteflow.maps import domain
 
-    chosen = {
-        name: given[option]
-        for name, option in (("size", "size"), ("temperatures", "temperature"))
-        if given[option] is not None
-    }
+    asked = {"size": given["size"], "temperatures": temperatures}
+    chosen = {name: value for name, value in asked.items() if value is not None}
     workers = given["processes"]
     if workers is None:
         workers = min(available_cores(), _MOST_PROCESSES)
@@ -86,15 +91,15 @@ def command(**given: Any) -> None:
             workers=workers,
             progress=lambda done, known: progress.tell(f"{done} of {known} columns, as far as is known"),
             **chosen,
-            **options.search(given),
+            **search,
         )
     if given["as_json"]:
         from chuteflow.io import contract
-        from chuteflow.io.domain_records import domain_object
+        from chuteflow.io.domain_records import domain_object, in_si
 
-        answer = contract.text(domain_object(found))
+        answer = contract.text(domain_object(found) | in_si(found, scales))
     else:
-        answer = "\n".join(_report(found))
+        answer = "\n".join(_report(found, scales))
 
     def save(path: str) -> None:
         from chuteflow.io import files
@@ -127,10 +132,11 @@ def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:
     return axes[0], axes[1], options.chute({**given, **{name: low for name, (low, _) in ranges.items()}})
 
 
-def _report(found: Domain) -> Iterator[str]:
+def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
     from chuteflow.io.contract import SHORT
-    from chuteflow.io.domain_records import BITS, CLASSES, shares
+    from chuteflow.io.datasets import BITS, CLASSES
+    from chuteflow.io.domain_records import shares
 
     plane = found.plane
     x, y = plane.x, plane.y
@@ -150,15 +156,19 @@ def _report(found: Domain) -> Iterator[str]:
     for name, (_, values) in CLASSES.items():
         for value, share in parts[name].items():
             rows.append([name, _named(int(value), values, name in BITS), f"{share:.2%}"])
+    of = None if "slope" in (x.name, y.name) else scales
     for temperature, part in zip(plane.temperatures, parts["exists_at"], strict=True):
-        rows.append([f"a flow at T = {temperature:g}", "flow", f"{part.get('1', 0.0):.2%}"])
+        at = words.amount("surface_temperature", temperature, plane.chute, of) if of else f"{temperature:g}"
+        rows.append([f"a flow at T = {at}", "flow", f"{part.get('1', 0.0):.2%}"])
     yield tables.table(rows, words=(0, 1))
     yield ""
     kinds = [one.kind for one in found.boundaries]
     said = ", ".join(f"{kind} {kinds.count(kind)}" for kind in dict.fromkeys(kinds))
     yield f"boundaries (lines of each kind): {said or 'none'}"
     yield f"boundaries are located to {found.tolerance:g} of each axis, and narrower bands may be left out"
-    yield words.searched(found.searched, plane.chute, None)
+    yield words.searched(found.searched, plane.chute, of)
+    if scales is not None and of is None:
+        yield "temperatures and hold-ups are dimensionless: their scales change with the slope"
 
 
 def _named(value: int, values: Mapping[int, str], bits: bool) -> str:

@@ -51,7 +51,8 @@ METHOD_HELP = "How flows are computed: overburden (this package's, the default) 
     help="Format of the pictures; png by default.",
 )
 @options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
-def command(only: list[int] | None, out: str | None, kind: str | None, method: str | None) -> None:
+@options.quiet_option
+def command(only: list[int] | None, out: str | None, kind: str | None, method: str | None, quiet: bool) -> None:
     """Compute, draw and write."""
     folder = directory(out or ".")
     chosen = only or list(FIGURES)

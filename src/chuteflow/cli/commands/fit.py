@@ -51,7 +51,6 @@ class Range(click.ParamType):
 @click.argument("data", metavar="DATA.csv")
 @options.option("--free", metavar="NAMES", help="Parameters to be found, with commas between, such as e,ew,roughness.")
 @options.chute_options
-@options.scale_options
 @click.option("--base-height", is_flag=True, help="The height of the base is unknown too.")
 @click.option("--range", "ranges", type=Range(), multiple=True, help="Where a free parameter is looked for first.")
 @click.option("--trust", type=Range(), multiple=True, help="Use values of z, nu, T or u in this range alone.")
@@ -59,6 +58,7 @@ class Range(click.ParamType):
 @options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
 @options.option("--trials", type=click.INT, help="Trial chutes that the search starts from; 64 for one experiment.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@options.quiet_option
 @options.option("--plot", metavar="FILE", help="Draw measurements, fit and residuals into FILE: .png, .pdf or .svg.")
 @options.option(
     "--direct", metavar="FILE", help="Draw g1 and g2 as measured without a model, beside the law, into FILE."

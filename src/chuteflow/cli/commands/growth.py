@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.stability.planes import WaveMap
+    from chuteflow.steady.quantities import Scales
 
 #: Endings of the files that --save writes.
 SAVED = (".csv", ".json")
@@ -44,25 +45,25 @@ class Size(click.ParamType):
 @options.condition_options
 @options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
 @options.option(
-    "--kx", type=options.Interval(), help="Wavenumbers along the slope; by default to three times that of the maximum."
+    "--kx",
+    type=options.Interval(units=True),
+    help="Wavenumbers along the slope; by default to three times that of the maximum.",
 )
-@options.option("--ky", type=options.Interval(), help="Wavenumbers across the slope.")
+@options.option("--ky", type=options.Interval(units=True), help="Wavenumbers across the slope.")
 @options.option("--size", type=Size(), help="Points along kx and ky; 40x40 by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
+@options.output_options(SAVED)
 def command(**given: Any) -> None:
     """Solve, map, print, save and draw."""
     options.require_outputs(given, SAVED)
     chute = options.chute(given)
-    condition: dict[str, Any] = options.condition(given, chute, None)
+    scales = options.scales(given)
+    condition: dict[str, Any] = options.condition(given, chute, scales)
+    kx, ky = (options.own(given, name, "wavenumber", chute.slope, scales) for name in ("kx", "ky"))
     from chuteflow.branches.enumeration import flows
-    from chuteflow.io import contract
 
     found = flows(chute, **condition)
     if not len(found):
-        empty = {"chute": contract.chute_object(chute), "flow": None, "reason": found.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        options.deliver_without_flow(given, found, condition, scales, {"flow": None})
         return
     flow = options.chosen(found, given["which"])
     from chuteflow.io.growth_records import wave_object, wave_rows
@@ -72,8 +73,8 @@ def command(**given: Any) -> None:
     with Progress() as progress:
         mapped = wave_map(
             flow,
-            kx=given["kx"],
-            ky=given["ky"],
+            kx=kx,
+            ky=ky,
             progress=lambda share: progress.tell(f"{share:.0%} of the map"),
             **size,
         )
@@ -81,9 +82,11 @@ def command(**given: Any) -> None:
     def plotted() -> Figure:
         from chuteflow.plotting.growth_plot import plot_wave_map
 
-        return plot_wave_map(mapped)
+        return plot_wave_map(mapped, scales=scales)
 
-    options.deliver_object(given, wave_object(mapped), _report(mapped), lambda: wave_rows(mapped), plotted)
+    options.deliver_object(
+        given, wave_object(mapped, scales), _report(mapped, scales), lambda: wave_rows(mapped, scales), plotted
+    )
 
 
 def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
@@ -95,22 +98,28 @@ def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
         yield f"not known at {int(unresolved.sum())} points: the finest grids do not tell whether something grows there"
 
 
-def _report(found: WaveMap) -> Iterator[str]:
-    from chuteflow.io import tables, words
+def _report(found: WaveMap, scales: Scales | None) -> Iterator[str]:
+    from chuteflow.io import contract, tables, words
 
     flow = found.flow
     yield words.chute(flow.chute)
-    yield f"flow: Q = {tables.number(flow.mass_flux)}, h = {tables.number(flow.centre_of_mass)}"
+    if scales is not None:
+        yield words.scales(scales)
+
+    def said(name: str, value: float) -> str:
+        return words.amount(name, value, flow.chute, scales)
+
+    yield (f"flow: Q = {said('mass_flux', flow.mass_flux)}, h = {said('centre_of_mass', flow.centre_of_mass)}")
     yield ""
     growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
     i, j = np.unravel_index(int(growth.argmax()), growth.shape)
     if np.isfinite(growth[i, j]):
         yield (
-            f"largest growth on the map: {tables.number(float(growth[i, j]))} at kx = "
-            f"{tables.number(float(found.kx[i]))}, ky = {tables.number(float(found.ky[j]))}"
+            f"largest growth on the map: {said('growth', float(growth[i, j]))} at kx = "
+            f"{said('wavenumber', float(found.kx[i]))}, ky = {said('wavenumber', float(found.ky[j]))}"
         )
     yield (
-        f"growing: {int(found.grows.sum())} of {growth.size} points; growth below {found.smallest_rate:.2g} or below "
+        f"growing: {int(found.grows.sum())} of {growth.size} points; growth below {_least(found, scales)} or below "
         "its error counts as none"
     )
     yield from hidden_and_unresolved(found.growth, found.unresolved)
@@ -119,8 +128,18 @@ def _report(found: WaveMap) -> Iterator[str]:
         yield "no neutral curve in this range"
         return
     rows = [["neutral curve", "points", "from kx", "ky", "to kx", "ky", "error", "ends at"]]
+    wave = contract.factor("wavenumber", flow.chute, scales)
+    if scales is not None:
+        rows.append(["", "", *["[1/m]"] * 5, ""])
     for number, curve in enumerate(found.neutral, 1):
-        ends = [tables.number(float(value)) for z in (curve.z[0], curve.z[-1]) for value in z]
+        ends = [tables.number(wave * float(value)) for z in (curve.z[0], curve.z[-1]) for value in z]
         where = curve.ends[1] if curve.ends[0] == curve.ends[1] else "; ".join(curve.ends)
-        rows.append([str(number), str(len(curve.z)), *ends, f"{curve.error.max():.0e}", where])
+        rows.append([str(number), str(len(curve.z)), *ends, f"{wave * curve.error.max():.0e}", where])
     yield tables.table(rows, words=(7,))
+
+
+def _least(found: WaveMap, scales: Scales | None) -> str:
+    from chuteflow.io.contract import factor
+
+    rate = found.smallest_rate * factor("growth", found.flow.chute, scales)
+    return f"{rate:.2g}" + ("" if scales is None else " 1/s")

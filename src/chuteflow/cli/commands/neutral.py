@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
     from chuteflow.stability.planes import FamilyMap
     from chuteflow.steady.flow import Flow
+    from chuteflow.steady.quantities import Scales
 
-#: Flows of the family between which others are solved, and range of surface temperatures unless another is given.
-_FLOWS, _TEMPERATURES = 80, (0.05, 50.0)
+#: Columns of a table of a neutral curve.
+_ALONG = ("mass_flux", "centre_of_mass", "surface_temperature")
 _ANGLES = {"along": 0.0, "across": 90.0}
 _EPILOG = (
     "k h is the wavenumber times the height of the centre of mass. The family is that of the hottest flows in the "
@@ -35,26 +36,25 @@ _EPILOG = (
 @options.option("--waves", metavar="DIRECTION", help="along (the default), across, or an angle from 0 to 90 degrees.")
 @options.option("--kh", type=options.Interval(), help="Range of k h; 0.001:1 by default.")
 @options.option("--size", type=Size(), help="Points along k h and along the family; 24x24 by default.")
-@options.option("--search-temperature", type=options.Interval(), help="Surface temperatures; 0.05:50 by default.")
-@options.option("--largest-holdup", type=options.Number(), help="Largest mass hold-up searched; 30 by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write the map to FILE: .csv, or .json with the neutral curves.")
+@options.option(
+    "--search-temperature", type=options.Interval(units=True), help="Surface temperatures; 0.05:50 by default."
+)
+@options.option("--largest-holdup", type=options.NumberInUnits(), help="Largest mass hold-up searched; 30 by default.")
+@options.output_options(SAVED)
 def command(**given: Any) -> None:
     """Trace, map, print, save and draw."""
     options.require_outputs(given, SAVED)
     chute = options.chute(given)
     angle = _angle(given["waves"])
-    within: dict[str, Any] = {"surface_temperature": given["search_temperature"] or _TEMPERATURES}
-    if given["largest_holdup"] is not None:
-        within["largest_holdup"] = given["largest_holdup"]
-    from chuteflow.branches.curve import curve
-    from chuteflow.io import contract
+    scales = options.scales(given)
+    from chuteflow.stability.disturbed import FLOWS, TEMPERATURES
 
-    traced = curve(chute, points=_FLOWS, **within)
+    within: dict[str, Any] = {"surface_temperature": TEMPERATURES, **options.search(given, chute.slope, scales)}
+    from chuteflow.branches.curve import curve
+
+    traced = curve(chute, points=FLOWS, **within)
     if not traced.branches:
-        empty = {"chute": contract.chute_object(chute), "flows": None, "reason": traced.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {traced.reason}")
+        options.deliver_without_flow(given, traced, {}, scales, {"flows": None})
         return
     from chuteflow.io.growth_records import family_object, family_rows
     from chuteflow.stability.planes import family_map
@@ -71,9 +71,11 @@ def command(**given: Any) -> None:
     def plotted() -> Figure:
         from chuteflow.plotting.growth_plot import plot_family_map
 
-        return plot_family_map(mapped)
+        return plot_family_map(mapped, scales=scales)
 
-    options.deliver_object(given, family_object(mapped), _report(mapped), lambda: family_rows(mapped), plotted)
+    options.deliver_object(
+        given, family_object(mapped, scales), _report(mapped, scales), lambda: family_rows(mapped, scales), plotted
+    )
 
 
 def _angle(waves: str | None) -> float:
@@ -85,14 +87,16 @@ def _angle(waves: str | None) -> float:
         raise InputError(f"--waves {waves}: must be along, across or an angle from 0 to 90 degrees") from None
 
 
-def _report(found: FamilyMap) -> Iterator[str]:
+def _report(found: FamilyMap, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
     first, last = found.flows[0], found.flows[-1]
     low, high = (tables.number(float(found.depth_wavenumber[end])) for end in (0, -1))
     yield words.chute(found.flows[0].chute)
+    if scales is not None:
+        yield words.scales(scales)
     yield (
-        f"family: {_place(first)} to {_place(last)}; waves at {found.angle:g} degrees to the slope, "
+        f"family: {_place(first, scales)} to {_place(last, scales)}; waves at {found.angle:g} degrees to the slope, "
         f"k h from {low} to {high}"
     )
     yield ""
@@ -105,7 +109,10 @@ def _report(found: FamilyMap) -> Iterator[str]:
     for number, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True), 1):
         yield f"neutral curve {number}, {len(flows)} points, error of ln(k h) at most {curve.error.max():.0e}"
         yield f"it begins at {curve.ends[0]}, and ends at {curve.ends[1]}"
-        yield tables.table([["k h", "Q", "h", "T_surface"], *_rows(curve.z[:, 0].tolist(), flows)])
+        header = [
+            [*start, *cells] for start, cells in zip((["k h"], ["[1]"]), tables.heading(_ALONG, scales), strict=False)
+        ]
+        yield tables.table([*header, *_rows(curve.z[:, 0].tolist(), flows, scales)])
         yield ""
 
 
@@ -121,17 +128,17 @@ def _without(found: FamilyMap) -> str:
     )
 
 
-def _place(flow: Flow) -> str:
-    from chuteflow.io.tables import number
+def _place(flow: Flow, scales: Scales | None) -> str:
+    from chuteflow.io.words import amount
 
-    return f"T_surface = {number(flow.surface_temperature)}, Q = {number(flow.mass_flux)}"
+    temperature = amount("surface_temperature", flow.surface_temperature, flow.chute, scales)
+    return f"T_surface = {temperature}, Q = {amount('mass_flux', flow.mass_flux, flow.chute, scales)}"
 
 
-def _rows(depth_wavenumber: Sequence[float], flows: Sequence[Flow]) -> Iterator[list[str]]:
-    from chuteflow.io.tables import number
+def _rows(depth_wavenumber: Sequence[float], flows: Sequence[Flow], scales: Scales | None) -> Iterator[list[str]]:
+    from chuteflow.io.tables import number, numbers
 
     count = min(len(flows), 9)
     for i in sorted({round(j * (len(flows) - 1) / max(count - 1, 1)) for j in range(count)}):
         flow = flows[i]
-        numbers = (depth_wavenumber[i], flow.mass_flux, flow.centre_of_mass, flow.surface_temperature)
-        yield [number(value) for value in numbers]
+        yield [number(depth_wavenumber[i]), *numbers(flow, _ALONG, flow.chute, scales)]

@@ -40,9 +40,7 @@ _COLUMNS = (
 @options.option("--roughness", type=options.Number(), help="Another roughness of the base.")
 @options.condition_options
 @options.option("--confidence", type=options.Number(), help="Of the bands; 0.95 by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw curve and profiles with bands into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write to FILE: .csv (profiles with errors) or .json.")
+@options.output_options((".csv", ".json"), "curve and profiles with bands")
 def command(**given: Any) -> None:
     """Load, predict, print, save and draw."""
     options.require_outputs(given, (".csv", ".json"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,9 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.branches.results import FlowSet
-    from chuteflow.stability.layer import Layer
     from chuteflow.stability.relaxation import Moment, Outcome
     from chuteflow.steady.flow import Flow
+    from chuteflow.steady.quantities import Scales
 
 #: Rows of the table that is printed; nearness that counts as arrival, if it shrinks, and as rest.
 _ROWS, _ARRIVED, _SETTLED = 12, 0.01, 1e-6
@@ -48,118 +47,114 @@ _EPILOG = (
     "--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default, or 1 with --push."
 )
 @options.option("--push", type=options.Number(), help="Factor on the velocity; 1 by default.")
-@options.option("--duration", type=options.Number(), help="Time in sqrt(d/(g cos theta)); 2000 by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write the way to FILE: .csv or .json.")
+@options.option("--duration", type=options.NumberInUnits(), help="Time in sqrt(d/(g cos theta)); 2000 by default.")
+@options.output_options(_SAVED)
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
-    from chuteflow.io import contract
-    from chuteflow.stability.relaxation import outcome
+    from chuteflow.branches.enumeration import flows
+    from chuteflow.stability.disturbed import DURATION, LONGEST, relax
 
     options.require_outputs(given, _SAVED)
-    duration = 2000.0 if given["duration"] is None else given["duration"]
-    if not 0.0 < duration <= 1e8:
-        raise InputError(f"--duration {duration:g}: must be above 0 and at most 1e8")
-    found = _found(given)
+    chute = options.chute(given)
+    scales = options.scales(given)
+    asked = options.own(given, "duration", "time", chute.slope, scales)
+    duration = DURATION if asked is None else asked
+    if not 0.0 < duration <= LONGEST:
+        raise InputError(f"--duration {duration:g}: must be above 0 and at most {LONGEST:g}")
+    condition: dict[str, Any] = options.condition(given, chute, scales)
+    found = flows(chute, **condition)
     if not len(found):
-        empty = {"chute": contract.chute_object(found.chute), "flows": [], "reason": found.reason}
-        click.echo(contract.text(empty) if given["as_json"] else f"no flow: {found.reason}")
+        options.deliver_without_flow(given, found, condition, scales, {"flows": []})
         return
     flow = options.chosen(found, given["which"])
-    layer, start = _start(flow, given["heat"], given["push"])
-    moments = _followed(layer, start, duration)
-    end = outcome(layer, moments)
-    content = _content(flow, moments, end)
+    with Progress(seconds=1.0) as progress:
+        followed = relax(
+            flow,
+            temperature=given["heat"],
+            velocity=given["push"],
+            duration=duration,
+            progress=lambda time: progress.tell(f"t = {time:.6g} of {duration:.6g}"),
+        )
+    moments, end = followed.moments, followed.outcome
+    content = _content(flow, moments, end, scales)
     options.deliver_object(
-        given, content, _told(flow, moments, end), partial(_rows, content), partial(_plotted, flow, moments, end)
+        given,
+        content,
+        _told(flow, moments, end, scales),
+        partial(_rows, content),
+        partial(_plotted, flow, moments, end, scales),
     )
 
 
-def _found(given: Mapping[str, Any]) -> FlowSet:
-    from chuteflow.branches.enumeration import flows
+def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> dict[str, Any]:
+    from chuteflow.io.contract import chute_object, factor, flow_object, units_object
+    from chuteflow.steady.quantities import NUMBERS
 
-    chute = options.chute(given)
-    asked: dict[str, Any] = options.condition(given, chute, None)
-    return flows(chute, **asked)
-
-
-def _start(flow: Flow, heat: float | None, push: float | None) -> tuple[Layer, Any]:
-    """The layer and its disturbed state."""
-    from chuteflow.stability.layer import Layer
-    from chuteflow.stability.relaxation import disturbed
-
-    layer = Layer.of(flow)
-    if heat is None:
-        heat = 1.1 if push is None else 1.0
-    return layer, disturbed(layer.steady(flow), temperature=heat, velocity=1.0 if push is None else push)
-
-
-def _followed(layer: Layer, start: Any, duration: float) -> list[Moment]:
-    """All moments; how far it is, on a terminal, once a second."""
-    from chuteflow.stability.relaxation import relax
-
-    moments: list[Moment] = []
-    with Progress(seconds=1.0) as progress:
-        for moment in relax(layer, start, duration):
-            moments.append(moment)
-            progress.tell(f"t = {moment.time:.6g} of {duration:.6g}")
-    return moments
-
-
-def _content(flow: Flow, moments: Sequence[Moment], end: Outcome) -> dict[str, Any]:
-    from chuteflow.io.contract import chute_object, flow_object
-
+    by = {name: factor(name, flow.chute, scales) for name in (*_COLUMNS.values(), "growth")}
+    rate = by["growth"]
     return {
         "chute": chute_object(flow.chute),
-        "from": flow_object(flow),
-        **{symbol: [getattr(moment, name) for moment in moments] for symbol, name in _COLUMNS.items()},
-        "steady": [flow_object(candidate) for candidate in end.steady],
+        "from": flow_object(flow, scales),
+        **{symbol: [by[name] * getattr(moment, name) for moment in moments] for symbol, name in _COLUMNS.items()},
+        "steady": [flow_object(candidate, scales) for candidate in end.steady],
         "nearest": end.nearest,
         "distance": end.distance if end.nearest is not None else None,
-        "rate": end.rate,
-        "leading": end.leading,
+        "rate": rate * end.rate,
+        "leading": None if end.leading is None else rate * end.leading,
         "arrested": end.arrested,
+        **units_object(scales, (*NUMBERS, "time", "growth")),
     }
 
 
-def _told(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Iterator[str]:
+def _told(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
+    from chuteflow.io.contract import factor
     from chuteflow.io.tables import number, table
+    from chuteflow.steady.quantities import SCALED
 
     wanted = {round(i * (len(moments) - 1) / (_ROWS - 1)) for i in range(_ROWS)}
-    rows = [[number(getattr(moments[i], name)) for name in _COLUMNS.values()] for i in sorted(wanted)]
+    by = {name: factor(name, flow.chute, scales) for name in _COLUMNS.values()}
+    rows = [[number(by[name] * getattr(moments[i], name)) for name in by] for i in sorted(wanted)]
+    units = [] if scales is None else [[f"[{SCALED[name].unit}]" for name in by]]
     yield words.chute(flow.chute)
+    if scales is not None:
+        yield words.scales(scales)
     yield ""
-    yield table([list(_COLUMNS), *rows])
+    yield table([list(_COLUMNS), *units, *rows])
     yield ""
-    yield _verdict(flow, moments[-1], end)
+    yield _verdict(flow, moments[-1], end, scales)
 
 
-def _verdict(flow: Flow, last: Moment, end: Outcome) -> str:
-    from chuteflow.io.tables import number
+def _verdict(flow: Flow, last: Moment, end: Outcome, scales: Scales | None) -> str:
+    from chuteflow.io.words import amount
 
+    def said(name: str, value: float) -> str:
+        return amount(name, value, flow.chute, scales)
+
+    ended = said("time", last.time)
     if end.arrested:
-        return f"it comes to rest at t = {number(last.time)}: collisions take more energy than the slope gives"
+        return f"it comes to rest at t = {ended}: collisions take more energy than the slope gives"
     if end.nearest is None:
-        return f"no steady flow has this hold-up within the range searched, M = {number(flow.mass_holdup)}"
+        return f"no steady flow has this hold-up within the range searched, M = {said('mass_holdup', flow.mass_holdup)}"
     target = end.steady[end.nearest]
     same = abs(target.surface_temperature / flow.surface_temperature - 1.0) < 1e-6
-    name = "the flow it came from" if same else f"another flow of the same hold-up, Q = {number(target.mass_flux)}"
+    name = (
+        "the flow it came from"
+        if same
+        else f"another flow of the same hold-up, Q = {said('mass_flux', target.mass_flux)}"
+    )
     away = f"{100.0 * end.distance:.2g} % away"
     if end.distance < _SETTLED:
-        return f"it has come to {name}: {away} at t = {number(last.time)}"
-    pace = f"the distance changed at the rate {number(end.rate)} in the last fifth of the time"
+        return f"it has come to {name}: {away} at t = {ended}"
+    pace = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
     if end.leading is not None:
         pace += (
-            f" (the leading discrete mode of that flow has the rate {number(end.leading)}; what is slower "
+            f" (the leading discrete mode of that flow has the rate {said('growth', end.leading)}; what is slower "
             "belongs to the continuous spectrum and depends on the grid)"
         )
     if end.distance < _ARRIVED and end.rate < 0.0:
-        return f"it comes to {name}: {away} at t = {number(last.time)}, and {pace}"
-    return (
-        f"not settled at t = {number(last.time)}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
-    )
+        return f"it comes to {name}: {away} at t = {ended}, and {pace}"
+    return f"not settled at t = {ended}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
 
 
 def _rows(content: dict[str, Any]) -> list[list[str]]:
@@ -167,7 +162,7 @@ def _rows(content: dict[str, Any]) -> list[list[str]]:
     return [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
 
 
-def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome) -> Figure:
+def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Figure:
     from chuteflow.plotting.relaxation_plot import plot_relaxation
 
-    return plot_relaxation(flow, moments, end)
+    return plot_relaxation(flow, moments, end, scales=scales)

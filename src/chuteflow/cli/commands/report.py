@@ -28,7 +28,8 @@ _NAME = "index.html"
 @options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
 @options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
 @click.option("--no-claims", is_flag=True, help="Leave out the claims.")
-def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool) -> None:
+@options.quiet_option
+def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool, quiet: bool) -> None:
     """Compute all, and write the page at the end, whole or not at all."""
     path = directory(out or ".") / _NAME
     from chuteflow.io.writing import require_writable, write_whole
@@ -46,6 +47,11 @@ def command(out: str | None, method: str | None, only: list[int] | None, no_clai
     click.echo(f"{path}: {len(figures)} figures, {len(verdicts)} claims, {report.seconds:.0f} s")
 
 
+def _tell(progress: str) -> None:
+    if not options.is_quiet():
+        click.echo(progress, err=True)
+
+
 def _drawn(number: int, flows: Source) -> Shown:
     from chuteflow.paper.captions import CAPTIONS
     from chuteflow.paper.facts import facts
@@ -61,7 +67,7 @@ def _drawn(number: int, flows: Source) -> Shown:
         facts=facts(data),
         notes=(method_note(number, flows), *data.table().notes),
     )
-    click.echo(f"figure {number} of {max(FIGURES)}: {time.perf_counter() - begin:.1f} s", err=True)
+    _tell(f"figure {number} of {max(FIGURES)}: {time.perf_counter() - begin:.1f} s")
     return found
 
 
@@ -71,5 +77,5 @@ def _checked() -> list[Verdict]:
     found = []
     for verdict in check():
         found.append(verdict)
-        click.echo(f"claim {len(found)} of {len(CLAIMS)}, {verdict.id}: {verdict.verdict}", err=True)
+        _tell(f"claim {len(found)} of {len(CLAIMS)}, {verdict.id}: {verdict.verdict}")
     return found

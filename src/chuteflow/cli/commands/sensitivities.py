@@ -31,14 +31,12 @@ _HEIGHTS = 21
 @options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest; all by default.")
 @options.option("--fixed", metavar="NAME", help="What is kept: Q (the default), M, h or T_surface.")
 @options.option("--parameters", metavar="NAMES", help="Parameters, with commas between; all by default.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, with profiles.")
-@options.option("--plot", metavar="FILE", help="Draw them, ranked, into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write the table of one flow to FILE: .csv or .json.")
+@options.output_options((".csv", ".json"), "them, ranked,")
 def command(**given: Any) -> None:
     """Solve, differentiate, print, save and draw."""
     options.require_outputs(given, (".csv", ".json"))
     chute = options.chute(given)
-    condition: dict[str, Any] = options.condition(given, chute, None)
+    condition: dict[str, Any] = options.condition(given, chute, options.scales(given))
     from chuteflow.branches.enumeration import flows
     from chuteflow.io import contract
     from chuteflow.io.sensitivity_records import sensitivity_object, sensitivity_rows

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -35,14 +35,14 @@ _COLUMNS = (
     "depth",
     "interface_height",
 )
+_SPEEDS = ("mean_velocity", "surface_velocity", "froude_number", "mean_volume_fraction")
 
 
 @click.command("solve", help=COMMANDS["solve"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
 @options.search_options
-@options.output_options
-@options.scale_options
+@options.output_options()
 def command(**given: Any) -> None:
     """Solve, print, save and draw."""
     chute = options.chute(given)
@@ -51,13 +51,14 @@ def command(**given: Any) -> None:
     options.require_outputs(given)
     from chuteflow.branches.enumeration import flows
 
-    found = flows(chute, **condition, **options.search(given))
+    found = flows(chute, **condition, **options.search(given, chute.slope, scales))
+    near, lines = ({}, []) if len(found) else options.nearest(chute, condition, found.searched, scales)
     if given["as_json"]:
         from chuteflow.io import contract
 
-        answer = contract.text(contract.flow_set_object(found, scales))
+        answer = contract.text(contract.flow_set_object(found, scales) | near)
     else:
-        answer = "\n".join(_report(found, scales))
+        answer = "\n".join(_report(found, lines, scales))
 
     def save(path: str) -> None:
         from chuteflow.io import files
@@ -72,29 +73,19 @@ def command(**given: Any) -> None:
     options.deliver(given, answer, save, plotted)
 
 
-def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
-    from chuteflow.io import tables, words
+def _report(found: FlowSet, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
+    from chuteflow.io import words
 
     yield words.chute(found.chute)
     if scales is not None:
         yield words.scales(scales)
     if found.flows:
         columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
-        header = [
-            ["", *cells, end, word]
-            for cells, end, word in zip(
-                tables.heading(columns, scales), ("error", "[1]"), ("validity", ""), strict=False
-            )
-        ]
-        rows = [
-            [
-                *(str(i), *tables.numbers(flow, columns, found.chute, scales)),
-                *(f"{flow.error:.0e}", flow.validity.summary),
-            ]
-            for i, flow in enumerate(found, 1)
-        ]
+        ends = [[f"{flow.error:.0e}", flow.validity.summary] for flow in found]
         yield ""
-        yield tables.table([*header, *rows], words=(len(columns) + 2,))
+        yield _table(found, columns, [["error", "validity"], ["[1]", ""]], ends, scales)
+        yield ""
+        yield _table(found, _SPEEDS, [[], []], [[] for _ in found], scales)
         yield ""
         for i, flow in enumerate(found, 1):
             yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
@@ -104,6 +95,25 @@ def _report(found: FlowSet, scales: Scales | None) -> Iterator[str]:
         yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
     else:
         yield words.in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
     if found.incomplete:
         yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
     yield words.searched(found.searched, found.chute, scales)
+
+
+def _table(
+    found: FlowSet,
+    columns: Sequence[str],
+    heads: Sequence[list[str]],
+    ends: Sequence[list[str]],
+    scales: Scales | None,
+) -> str:
+    """Numbers of the flows, one in a row, with other cells under ``heads`` at their ends."""
+    from chuteflow.io import tables
+
+    header = [["", *cells, *head] for cells, head in zip(tables.heading(columns, scales), heads, strict=False)]
+    rows = [
+        [str(i), *tables.numbers(flow, columns, found.chute, scales), *end]
+        for i, (flow, end) in enumerate(zip(found, ends, strict=True), 1)
+    ]
+    return tables.table([*header, *rows], words=(len(columns) + 2,))

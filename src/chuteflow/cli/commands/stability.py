@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.errors import InputError, SolveError
+from chuteflow.steady.quantities import SCALED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +23,9 @@ if TYPE_CHECKING:
     from chuteflow.stability.budget import Budget
     from chuteflow.stability.modes import Mode
     from chuteflow.stability.verdict import Stability
+    from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
+    from chuteflow.steady.quantities import Scales
 
 _EPILOG = (
     "A flow is stable if no discrete mode with a wavenumber from 1e-3/h to 10/h grows faster than 1e-6 "
@@ -32,26 +36,34 @@ _EPILOG = (
 )
 _SAVED = (".csv", ".json")
 _MOST = 20
+#: Symbols of the columns of modes, and their units.
+_HEADING = (
+    ("mode", "kx", "ky", "growth", "speed", "error"),
+    ("", "[1/m]", "[1/m]", "[1/s]", "[m/s]", "[1/s]"),
+)
 _VERDICTS = {True: "stable", False: "unstable", None: "?"}
 
 
 @click.command("stability", help=COMMANDS["stability"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
-@options.option("--kx", type=options.Number(), help="Wavenumber along the slope, in 1/d; searched if not given.")
-@options.option("--ky", type=options.Number(), help="Wavenumber across the slope, in 1/d; searched if not given.")
+@options.option("--kx", type=options.NumberInUnits(), help="Wavenumber along the slope, in 1/d; searched if not given.")
+@options.option(
+    "--ky", type=options.NumberInUnits(), help="Wavenumber across the slope, in 1/d; searched if not given."
+)
 @options.option(
     "--modes", "count", type=click.INT, help="Leading modes to tell, at the wavenumbers found; 1 by default."
 )
 @options.search_options
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.option("--plot", metavar="FILE", help="Draw the modes into FILE: .png, .pdf or .svg.")
 @options.option("--budget", metavar="FILE", help="Draw the energy budgets of the modes into FILE: .png, .pdf or .svg.")
-@options.option("--save", metavar="FILE", help="Write everything to FILE: .csv, or .json with the fields of the modes.")
+@options.output_options(_SAVED, "the modes")
 def command(as_json: bool, **given: Any) -> None:
     """Solve, search, print, save and draw."""
     chute = options.chute(given)
-    condition = options.condition(given, chute, None)
+    scales = options.scales(given)
+    condition = options.condition(given, chute, scales)
+    kx, ky = (options.own(given, name, "wavenumber", chute.slope, scales) for name in ("kx", "ky"))
+    search = options.search(given, chute.slope, scales)
     count = 1 if given["count"] is None else given["count"]
     if not 1 <= count <= _MOST:
         raise InputError(f"--modes {count}: must be from 1 to {_MOST}")
@@ -63,27 +75,28 @@ def command(as_json: bool, **given: Any) -> None:
     from chuteflow.branches.enumeration import flows
     from chuteflow.stability.modes import check_wavenumbers
 
-    check_wavenumbers(*(0.0 if given[name] is None else given[name] for name in ("kx", "ky")))
-    found = flows(chute, **condition, **options.search(given))
-    answers = [_answer(flow, given["kx"], given["ky"], count) for flow in found]
+    check_wavenumbers(*(0.0 if k is None else k for k in (kx, ky)))
+    found = flows(chute, **condition, **search)
+    near, lines = ({}, []) if len(found) else options.nearest(chute, condition, found.searched, scales)
+    answers = [_answer(flow, kx, ky, count) for flow in found]
     if as_json:
         from chuteflow.io import contract, stability_records
 
-        answer = contract.text(stability_records.answers_object(found, answers))
+        answer = contract.text(stability_records.answers_object(found, answers, scales=scales) | near)
     else:
-        answer = "\n".join(_report(found, answers))
+        answer = "\n".join(_report(found, answers, lines, scales))
 
     def plotted() -> Figure:
         from chuteflow.plotting.stability_plot import plot_modes
 
-        return plot_modes(found, answers)
+        return plot_modes(found, answers, scales=scales)
 
     def drawn() -> Figure:
         from chuteflow.plotting.stability_plot import plot_budgets
 
-        return plot_budgets(found, answers)
+        return plot_budgets(found, answers, scales=scales)
 
-    options.deliver(given, answer, partial(_save, found, answers), plotted, budget=drawn)
+    options.deliver(given, answer, partial(_save, found, answers, scales), plotted, budget=drawn)
 
 
 def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answer:
@@ -102,120 +115,149 @@ def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answe
     return Answer(flow, stability, tuple(modes), None)
 
 
-def _save(found: FlowSet, answers: Sequence[Answer], path: str) -> None:
+def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path: str) -> None:
     from chuteflow.io import stability_records
     from chuteflow.io.files import write_answer
 
     write_answer(
         path,
-        lambda: stability_records.answers_object(found, answers, fields=True),
-        lambda: stability_records.csv_rows(answers),
+        lambda: stability_records.answers_object(found, answers, fields=True, scales=scales),
+        lambda: stability_records.csv_rows(answers, scales),
     )
 
 
-def _report(found: FlowSet, answers: Sequence[Answer]) -> Iterator[str]:
+def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
     yield words.chute(found.chute)
+    if scales is not None:
+        yield words.scales(scales)
     if not answers:
-        yield f"no flow: {found.reason}"
+        yield words.in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
     else:
         columns = [*contract.PLACE]
-        head = ["", *tables.heading(columns, None)[0], "", "mode", "kx", "ky", "growth", "speed", "error"]
-        rows = [row for i, answer in enumerate(answers, 1) for row in _rows(str(i), answer, columns)]
+        head = [["", *cells, "", *rest] for cells, rest in zip(tables.heading(columns, scales), _HEADING, strict=False)]
+        rows = [row for i, answer in enumerate(answers, 1) for row in _rows(str(i), answer, columns, scales)]
         yield ""
-        yield tables.table([head, *rows], words=(5, 6))
+        yield tables.table([*head, *rows], words=(5, 6))
         yield ""
         for i, answer in enumerate(answers, 1):
-            yield f"{i}  {words.among(answer.flow, found)}: {_said(answer)}"
+            yield f"{i}  {words.among(answer.flow, found)}: {_said(answer, scales)}"
             if answer.budget is not None:
-                yield f"   {_fed(answer.budget)}"
-    yield words.searched(found.searched, found.chute, None)
+                yield f"   {_fed(answer.budget, _Said(found.chute, scales))}"
+    yield words.searched(found.searched, found.chute, scales)
 
 
-def _rows(number: str, answer: Answer, columns: Sequence[str]) -> Iterator[list[str]]:
+@dataclass(frozen=True)
+class _Said:
+    """Numbers of disturbances on a chute in words, with units where there are scales."""
+
+    chute: Chute
+    scales: Scales | None
+
+    def __call__(self, name: str, value: float) -> str:
+        from chuteflow.io.words import amount
+
+        return amount(name, value, self.chute, self.scales)
+
+    def rounded(self, name: str, value: float, digits: int) -> str:
+        """The same with so many ``digits``."""
+        from chuteflow.io.contract import factor
+
+        unit = "" if self.scales is None else f" {SCALED[name].unit}"
+        return f"{value * factor(name, self.chute, self.scales):.{digits}g}{unit}"
+
+
+def _rows(number: str, answer: Answer, columns: Sequence[str], scales: Scales | None) -> Iterator[list[str]]:
     from chuteflow.io import tables
+    from chuteflow.io.contract import factor
 
-    start = [number, *tables.numbers(answer.flow, columns, answer.flow.chute, None)]
+    chute = answer.flow.chute
+    wave, rate, pace = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
+    start = [number, *tables.numbers(answer.flow, columns, chute, scales)]
     verdict = _VERDICTS[None if answer.found is None else answer.found.stable]
     if not answer.modes:
         yield [*start, verdict, *("-" for _ in range(6))]
     for i, mode in enumerate(answer.modes):
         place = [*start, verdict] if i == 0 else [""] * (len(start) + 1)
-        speed = "-" if mode.speed is None else tables.number(mode.speed)
-        yield [*place, mode.kind, *map(tables.number, (mode.kx, mode.ky, mode.growth)), speed, f"{mode.error:.0e}"]
+        speed = "-" if mode.speed is None else tables.number(pace * mode.speed)
+        numbers = map(tables.number, (wave * mode.kx, wave * mode.ky, rate * mode.growth))
+        yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
 
 
-def _said(answer: Answer) -> str:
+def _said(answer: Answer, scales: Scales | None) -> str:
     if answer.found is None:
         return f"not known: {answer.reason}"
-    found = answer.found
-    return _of_all(found) if found.complete else _of_some(found)
+    found, said = answer.found, _Said(answer.flow.chute, scales)
+    return _of_all(found, said) if found.complete else _of_some(found, said)
 
 
-def _fed(budget: Budget) -> str:
+def _fed(budget: Budget, said: _Said) -> str:
     """What feeds a mode and what it loses most by, of its energy budget."""
-    from chuteflow.io.tables import number
-
     terms = sorted(budget.terms, key=lambda term: -term.total)
-    told = ", ".join(f"{term.name} {number(term.total)}" for term in (*terms[:2], *terms[-2:]))
-    growth = number(budget.mode.growth)
+    told = ", ".join(f"{term.name} {said('growth', term.total)}" for term in (*terms[:2], *terms[-2:]))
+    growth = said("growth", budget.mode.growth)
     return f"energy of the mode: {told}, of a growth rate of {growth}; closes to {abs(budget.closure):.0e}"
 
 
-def _of_all(found: Stability) -> str:
+def _of_all(found: Stability, told: _Said) -> str:
     """The verdict after all of the range was searched, and what stayed unresolved."""
     from chuteflow.io.stability_records import why_unknown
-    from chuteflow.io.tables import number
 
     (low, high), mode = found.searched, found.mode
     if found.grows and mode is not None:
-        said = f"unstable: {_wave(mode)} grows by e in a time {number(1.0 / mode.growth)}"
+        said = f"unstable: {_wave(mode, told)} grows by e in a time {told('time', 1.0 / mode.growth)}"
         if found.unresolved:
-            said += f"; others may grow faster at {_places(found)}, where the grids do not tell"
+            said += f"; others may grow faster at {_places(found, told)}, where the grids do not tell"
         return said
-    told = "the continuous spectrum hides all modes" if mode is None else f"the slowest to decay is {_wave(mode)}"
+    slowest = "the continuous spectrum hides all modes"
+    if mode is not None:
+        slowest = f"the slowest to decay is {_wave(mode, told)}"
     if found.stable is None:
-        return f"not known: {why_unknown(found)}, at {_places(found)}; elsewhere {told}"
-    return (
-        f"stable: nothing grows faster than {found.smallest_rate:.2g} for wavenumbers from {low:.3g} to {high:.3g}; "
-        f"{told}"
+        return f"not known: {why_unknown(found)}, at {_places(found, told)}; elsewhere {slowest}"
+    rate, least, most = (
+        told.rounded("growth", found.smallest_rate, 2),
+        *(told.rounded("wavenumber", k, 3) for k in (low, high)),
     )
+    return f"stable: nothing grows faster than {rate} for wavenumbers from {least} to {most}; {slowest}"
 
 
-def _of_some(found: Stability) -> str:
+def _of_some(found: Stability, told: _Said) -> str:
     """What the wave does that was asked about, or the fastest of those that were."""
-    from chuteflow.io.tables import number
-
     rest = "; whether the flow is stable is not known from this: give neither --kx nor --ky"
     mode = found.mode
     if mode is None:
         unknown = "the grids do not tell what it does" if found.unresolved else "it decays: no mode is told"
-        return f"the wave at {_places(found)}: {unknown}{rest}" if found.unresolved else f"{unknown}{rest}"
+        return f"the wave at {_places(found, told)}: {unknown}{rest}" if found.unresolved else f"{unknown}{rest}"
     if found.grows:
-        return f"{_wave(mode)} grows by e in a time {number(1.0 / mode.growth)}: this wave makes the flow unstable"
+        time = told("time", 1.0 / mode.growth)
+        return f"{_wave(mode, told)} grows by e in a time {time}: this wave makes the flow unstable"
     if mode.growth < -found.smallest_rate:
-        return f"{_wave(mode)} decays by e in a time {number(-1.0 / mode.growth)}{rest}"
-    return f"{_wave(mode)} neither grows nor decays faster than {found.smallest_rate:.2g}{rest}"
+        return f"{_wave(mode, told)} decays by e in a time {told('time', -1.0 / mode.growth)}{rest}"
+    rate = told.rounded("growth", found.smallest_rate, 2)
+    return f"{_wave(mode, told)} neither grows nor decays faster than {rate}{rest}"
 
 
-def _places(found: Stability) -> str:
+def _places(found: Stability, told: _Said) -> str:
     """The unresolved wavenumbers, the first few of them."""
-    some = ", ".join(f"kx = {kx:.3g} and ky = {ky:.3g}" for kx, ky in found.unresolved[:3])
+    some = ", ".join(
+        " and ".join(f"{name} = {told.rounded('wavenumber', k, 3)}" for name, k in (("kx", kx), ("ky", ky)))
+        for kx, ky in found.unresolved[:3]
+    )
     more = len(found.unresolved) - 3
     return f"{some} and {more} more" if more > 0 else some
 
 
-def _wave(mode: Mode) -> str:
+def _wave(mode: Mode, told: _Said) -> str:
     import math
-
-    from chuteflow.io.tables import number
 
     if mode.direction == "uniform":
         return "a disturbance that is the same all along the chute"
-    length = number(2.0 * math.pi / math.hypot(mode.kx, mode.ky))
+    length = told("height", 2.0 * math.pi / math.hypot(mode.kx, mode.ky))
+    long = f"{length} grain diameters long" if told.scales is None else f"{length} long"
     what = {"along": "along the slope", "across": "across the slope", "oblique": "oblique to the slope"}
-    moves = "at rest" if mode.speed is None else f"with crests that move at {number(mode.speed)}"
+    moves = "at rest" if mode.speed is None else f"with crests that move at {told('wave_speed', mode.speed)}"
     if mode.speed is None and abs(mode.frequency) > mode.error:
-        moves = f"that oscillates with the frequency {number(abs(mode.frequency))}"
-    return f"a wave {what[mode.direction]}, {length} grain diameters long, {moves},"
+        moves = f"that oscillates with the frequency {told('frequency', abs(mode.frequency))}"
+    return f"a wave {what[mode.direction]}, {long}, {moves},"

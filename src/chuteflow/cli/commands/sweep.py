@@ -70,6 +70,7 @@ class Chunks(click.ParamType):
 @options.option("--chunks", type=Chunks(), help="Compute these chunks alone: N, A:B or A:B:STEP, with commas between.")
 @click.option("--dry-run", is_flag=True, help="Tell points, chunks and an estimate of the time, and write nothing.")
 @click.option("--status", is_flag=True, help="Check the store, and tell what of it is done and which points failed.")
+@options.quiet_option
 @click.option("--no-check", is_flag=True, help="Believe the markers of the store: do not check its arrays.")
 def command(study: str, **given: Any) -> None:
     """Read the study, compute what is left of it and tell what came out."""
@@ -233,7 +234,7 @@ class Watch:
         self._begin, self._first, self._told = time.monotonic(), self._done, float("-inf")
         self._points = self._flows = self._failed = 0
         self._line = Progress()
-        if self._done:
+        if self._done and not options.is_quiet():
             click.echo(f"{self._done} of {self._whole} chunks are done already", err=True)
 
     def add(self, marker: Marker) -> None:
@@ -262,7 +263,7 @@ class Watch:
         )
         if self._line.is_shown:
             self._line.tell(text)
-        else:
+        elif not options.is_quiet():
             click.echo(text, err=True)
 
 

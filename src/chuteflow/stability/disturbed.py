@@ -1,0 +1,119 @@
+"""Disturbances at the top of the package: their growth, neutral curves, and a disturbed flow followed in time.
+
+The analyses themselves are in the modules beside this one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from chuteflow.branches.curve import curve
+from chuteflow.branches.results import Branch, Curve
+from chuteflow.checks import number
+from chuteflow.errors import InputError
+from chuteflow.stability import relaxation
+from chuteflow.stability.layer import Layer
+from chuteflow.stability.planes import FamilyMap, WaveMap, family_map, wave_map
+from chuteflow.stability.relaxation import Relaxation, disturbed, outcome
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.flow import Flow
+
+#: Flows of a family between which others are solved, and the range of surface temperatures, where a chute is given.
+FLOWS, TEMPERATURES = 80, (0.05, 50.0)
+#: How long a flow is followed, and by how much it is heated, unless something else is asked for.
+DURATION, LONGEST, HEAT = 2000.0, 1e8, 1.1
+Progress = Callable[[float], None]
+
+
+def growth(
+    flow: Flow,
+    *,
+    kx: tuple[float, float] | None = None,
+    ky: tuple[float, float] | None = None,
+    size: tuple[int, int] = (40, 40),
+    progress: Progress | None = None,
+) -> WaveMap:
+    """Growth rates of ``flow`` over the wavenumbers along and across the slope, with the neutral curves.
+
+    Args:
+        flow: the steady flow.
+        kx: range of wavenumbers along the slope, in 1/d; by default to three times that of the fastest growing mode.
+        ky: range of wavenumbers across the slope.
+        size: points along kx and ky.
+        progress: called with the share that is done.
+
+    Raises:
+        InputError: for numbers out of range, and where stability cannot be posed.
+    """
+    return wave_map(flow, kx=kx, ky=ky, size=size, **_watched(progress))
+
+
+def neutral(
+    line: Chute | Curve | Branch | Sequence[Flow],
+    *,
+    angle: float = 0.0,
+    depth_wavenumber: tuple[float, float] = (1e-3, 1.0),
+    size: tuple[int, int] = (24, 24),
+    progress: Progress | None = None,
+) -> FamilyMap:
+    """Growth rates of waves in one direction along a family of flows, with the neutral curves.
+
+    Args:
+        line: neighbouring flows of one family: a branch, the first branch of a curve, or a chute, of which the hottest
+            family is followed over surface temperatures from 0.05 to 50.
+        angle: of the waves to the slope, in degrees: 0 along it, 90 across.
+        depth_wavenumber: range of k h, with h the centre of mass.
+        size: points along k h and along the family.
+        progress: called with the share that is done.
+
+    Raises:
+        InputError: for numbers out of range, a chute without flows, and where stability cannot be posed.
+    """
+    if isinstance(line, Chute):
+        line = curve(line, points=FLOWS, surface_temperature=TEMPERATURES)
+    if isinstance(line, Curve):
+        if not line.branches:
+            raise InputError(f"there is no flow: {line.reason}")
+        line = line.branches[0]
+    flows = line.flows if isinstance(line, Branch) else tuple(line)
+    return family_map(flows, angle=angle, depth_wavenumber=depth_wavenumber, size=size, **_watched(progress))
+
+
+def relax(
+    flow: Flow,
+    *,
+    temperature: float | None = None,
+    velocity: float | None = None,
+    duration: float = DURATION,
+    progress: Progress | None = None,
+) -> Relaxation:
+    """A disturbed ``flow`` followed in time, the same all along the chute and of one hold-up.
+
+    Args:
+        flow: a steady flow with a free surface.
+        temperature: factor on the granular temperature at the start; 1.1 by default, or 1 where a velocity is given.
+        velocity: factor on the velocity at the start; 1 by default.
+        duration: time, in sqrt(d/(g cos theta)).
+        progress: called with the time that is reached.
+
+    Raises:
+        InputError: for a factor or duration out of range.
+        SolveError: where the integration cannot go on.
+    """
+    duration = number("duration", duration)
+    if not 0.0 < duration <= LONGEST:
+        raise InputError(f"duration = {duration:g}: must be above 0 and at most {LONGEST:g}")
+    if temperature is None:
+        temperature = HEAT if velocity is None else 1.0
+    layer = Layer.of(flow)
+    start = disturbed(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
+    moments = []
+    for moment in relaxation.relax(layer, start, duration):
+        moments.append(moment)
+        if progress is not None:
+            progress(moment.time)
+    return Relaxation(flow, tuple(moments), outcome(layer, moments))
+
+
+def _watched(progress: Progress | None) -> dict[str, Progress]:
+    return {} if progress is None else {"progress": progress}

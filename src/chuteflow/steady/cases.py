@@ -1,0 +1,161 @@
+"""Chutes and materials by name: the paper's chutes, and common grains with the source of each number.
+
+A case says some or all of the numbers of a chute, and for materials the grains too, with which results take SI units.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
+from chuteflow.steady.chute import Chute
+from chuteflow.steady.quantities import Scales
+
+#: How a number of a case is known.
+MEASURED, GUESSED, DEFINED = "measured", "guessed", "defined"
+#: Numbers of the grains, arguments of :class:`chuteflow.Scales`, and their SI units.
+GRAINS = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
+
+
+@dataclass(frozen=True)
+class Known:
+    """A number of a case: its ``value``, ``how`` it is known, its ``uncertainty`` (one standard deviation of what was
+    measured, or a range for what is guessed; None for what is defined) and its ``source``."""
+
+    value: float
+    how: str = DEFINED
+    uncertainty: float | None = None
+    source: str = ""
+
+    def __str__(self) -> str:
+        spread = "" if self.uncertainty is None else f" +- {self.uncertainty:g}"
+        return f"{self.value:g}{spread} ({self.how}{f': {self.source}' if self.source else ''})"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Some or all numbers of a chute under a name.
+
+    ``numbers`` are by the keys of the parameters (``slope``, ``e``, ``ew``, ``roughness``), ``names`` are its
+    ``surface``, ``closure`` and ``base`` as far as it says them, and ``grains`` its diameter (m), density (kg/m^3) and
+    gravity (m/s^2).
+    """
+
+    name: str
+    description: str
+    numbers: Mapping[str, Known]
+    names: Mapping[str, str] = field(default_factory=dict)
+    grains: Mapping[str, Known] = field(default_factory=dict)
+
+    def chute(self, **others: Any) -> Chute:
+        """The chute of this case, with ``others``, arguments of :class:`chuteflow.Chute`, in the place of its own.
+
+        Raises:
+            InputError: for a number that neither says, or one out of range.
+        """
+        values: dict[str, Any] = {BY_KEY[key].name: known.value for key, known in self.numbers.items()}
+        values |= dict(self.names) | others
+        missing = [one.name for one in BY_KEY.values() if one.name not in values]
+        if missing:
+            raise InputError(f"{self.name} has no {' and no '.join(missing)}: give it")
+        return Chute(**values)
+
+    @property
+    def scales(self) -> Scales | None:
+        """Its grains, with which results take SI units, or None where it does not say diameter and density."""
+        values = {name: known.value for name, known in self.grains.items()}
+        return Scales(**values) if {"diameter", "density"} <= values.keys() else None
+
+    def __repr__(self) -> str:
+        said = ", ".join(f"{key} = {known.value:g}" for key, known in self.numbers.items())
+        return f"<Case: {self.name}; {said}>"
+
+
+def case(name: str) -> Case:
+    """The case of this ``name``.
+
+    Raises:
+        InputError: for an unknown name, with those that are near.
+    """
+    if name not in CASES:
+        raise InputError(f"unknown case {name!r}: {nearest_names(name, CASES)}")
+    return CASES[name]
+
+
+def nearest_names(name: str, known: Iterable[str]) -> str:
+    """Which of the ``known`` names may be meant by ``name``, in words, and all of them where none is near."""
+    known = [*known]
+    lowered = {one.lower(): one for one in known}
+    near = difflib.get_close_matches(name.lower(), lowered, n=2) or [one for one in lowered if name.lower() in one]
+    if near:
+        return f"did you mean {' or '.join(lowered[one] for one in near)}?"
+    return f"choose one of {', '.join(known)}"
+
+
+def _paper(slope: float, e: float, ew: float, roughness: float) -> dict[str, Known]:
+    return {key: Known(value) for key, value in (("slope", slope), ("e", e), ("ew", ew), ("roughness", roughness))}
+
+
+_FOERSTER = "Foerster, Louge, Chang & Allia 1994, Phys. Fluids 6, 1108"
+_LORENZ = "Lorenz, Tuozzolo & Louge 1997, Exp. Mech. 37, 292"
+_GLUED = "grains glued to the base with gaps between none and a grain; see the page on choosing e, e_w and r"
+
+#: All cases by name.
+CASES: dict[str, Case] = {
+    one.name: one
+    for one in (
+        Case(
+            "paper-dissipative",
+            "the chute of the paper's figures 2 and 3, with three flows at Q = 3; its grains are those of most figures",
+            _paper(0.3, 0.8, 0.8, 0.6),
+        ),
+        Case(
+            "paper-productive",
+            "the chute of the paper's figure 5, whose interior is productive",
+            _paper(0.4, 0.9, 0.6, 0.8),
+        ),
+        Case(
+            "glass-beads",
+            "soda-lime glass beads, 3 mm, on a rough base of aluminium",
+            {
+                "e": Known(0.97, MEASURED, 0.01, _FOERSTER),
+                "ew": Known(0.83, MEASURED, 0.02, f"on aluminium; {_FOERSTER}"),
+                "roughness": Known(0.65, GUESSED, 0.1, _GLUED),
+            },
+            grains={
+                "diameter": Known(3e-3, MEASURED, 5e-5, _FOERSTER),
+                "density": Known(2500.0, MEASURED, 50.0, "handbooks, soda-lime glass"),
+            },
+        ),
+        Case(
+            "steel",
+            "stainless steel balls, 3 mm, on a rough base of steel",
+            {
+                "e": Known(0.95, MEASURED, 0.03, _LORENZ),
+                "ew": Known(0.9, GUESSED, 0.07, "a thick plate of steel loses somewhat more than two balls do"),
+                "roughness": Known(0.65, GUESSED, 0.1, _GLUED),
+            },
+            grains={
+                "diameter": Known(3e-3, DEFINED),
+                "density": Known(7900.0, MEASURED, 100.0, "handbooks, stainless steel"),
+            },
+        ),
+        Case(
+            "sand",
+            "quartz sand, 0.5 mm, on a base to which the same sand is glued",
+            {
+                "e": Known(0.7, GUESSED, 0.15, "grains with corners: no measurement holds for all sands"),
+                "ew": Known(0.7, GUESSED, 0.15, "as of two grains"),
+                "roughness": Known(0.7, GUESSED, 0.1, _GLUED),
+            },
+            grains={
+                "diameter": Known(5e-4, DEFINED),
+                "density": Known(2650.0, MEASURED, 30.0, "handbooks, quartz"),
+            },
+        ),
+    )
+}

@@ -1,0 +1,278 @@
+"""A chute is said once: by a file, a case or the environment; and results in SI units with its grains."""
+
+import json
+import math
+
+import click
+import pytest
+
+import chuteflow
+from chuteflow.branches.nearest import nearest
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.program import chuteflow as program
+from chuteflow.cli.program import main
+from chuteflow.io.chute_file import read_chute
+from chuteflow.steady.cases import CASES, GUESSED, MEASURED, case
+
+PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
+FILE = """
+case = "paper-dissipative"
+roughness = 0.65
+surface = "interface"
+[grains]
+diameter = "1 mm"
+density = 2500
+"""
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    monkeypatch.delenv("CHUTEFLOW_CASE", raising=False)
+
+    def call(*words):
+        code = main([part for word in words for part in (word.split() if isinstance(word, str) else word)])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE, encoding="utf-8")
+    return str(path)
+
+
+# The chute
+
+
+def test_a_case_is_its_numbers(run):
+    _, by_case, _ = run("solve --case paper-dissipative --flux 3 --json")
+    _, by_hand, _ = run(f"solve {PAPER} --flux 3 --json")
+    assert by_case == by_hand
+
+
+def test_the_environment_names_a_case_and_options_override_it(run, monkeypatch):
+    monkeypatch.setenv("CHUTEFLOW_CASE", "paper-dissipative")
+    _, out, _ = run("hot --slope 0.31 --json")
+    assert json.loads(out)["chute"]["slope"] == 0.31
+    assert json.loads(out)["chute"]["e"] == 0.8
+    _, out, _ = run("hot --case paper-productive --json")
+    assert json.loads(out)["chute"]["e"] == 0.9
+    _, out, _ = run("hot --angle 20 --json")
+    assert json.loads(out)["chute"]["slope"] == pytest.approx(math.tan(math.radians(20.0)), rel=1e-12)
+
+
+def test_a_file_describes_a_chute(run, file, monkeypatch):
+    _, out, _ = run("solve --flux 3 --json --chute", [file])
+    chute = json.loads(out)["chute"]
+    assert (chute["slope"], chute["roughness"], chute["surface"]) == (0.3, 0.65, "interface")
+    monkeypatch.setenv("CHUTEFLOW_CASE", file)
+    _, again, _ = run("solve --flux 3 --json")
+    assert json.loads(again) == json.loads(out)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("slope = 0.3\nangle = 17\n", "slope and angle"),
+        ("e = 0.8\nrestitution = 0.8\n", "e is given twice, also as restitution"),
+        ("slop = 0.3\n", "unknown key 'slop': did you mean slope?"),
+        ("e = 'a'\n", "e = 'a': must be a number"),
+        ("slope = [\n", "not a TOML file"),
+        ("[grains]\ndensity = '3 mm'\n", "'mm' is not a unit like kg/m^3"),
+        ("[grains]\ndensity = -1\n", "must be a positive number"),
+        ("case = 'glass'\n", "did you mean glass-beads?"),
+        ("surface = 3\n", "must be a name in quotes"),
+        ("[chute]\nslope = 0.3\n[grains]\nslope = 0.3\n", "slope is given twice"),
+        ("slope = 16.7\ne = 0.8\new = 0.8\nroughness = 0.6\n", "did you mean --angle 16.7?"),
+    ],
+)
+def test_a_bad_file_is_one_line(run, tmp_path, text, said):
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    code, out, err = run("hot --chute", [str(path)])
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("hot --case glas-beads", "unknown case 'glas-beads': did you mean glass-beads?"),
+        ("hot --case mine.toml", "a file is given by --chute mine.toml"),
+        ("hot --case sand", "missing --slope or --angle"),
+        ("hot --case sand --chute x.toml", "give one of them"),
+        ("hot --chute nowhere.toml", "nowhere.toml: cannot be read"),
+        ("cases marbles", "choose one of paper-dissipative"),
+        (f"hot {PAPER} --si", "--diameter is missing"),
+        (f"solve {PAPER.replace('0.3', '16.7')} --flux 3", "slope 16.7: did you mean --angle 16.7?"),
+        ("solve --angle 0.3 --case sand --flux 3", "angle 0.3: did you mean --slope 0.3?"),
+        ("solve --case sand --slope 0.35 --flux 3kg/m2 --si", "'kg/m2' is not a unit like kg/m/s"),
+    ],
+)
+def test_a_mistake_is_one_line(run, words, said):
+    code, out, err = run(words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_every_number_of_a_material_says_how_it_is_known():
+    for one in CASES.values():
+        for key, known in {**one.numbers, **one.grains}.items():
+            if known.how in (MEASURED, GUESSED):
+                assert known.uncertainty, (one.name, key)
+                assert known.source, (one.name, key)
+    assert case("sand").numbers["e"].how == GUESSED
+    assert case("glass-beads").numbers["e"].how == MEASURED
+
+
+def test_cases_are_listed_and_told(run):
+    _, out, _ = run("cases")
+    assert all(name in out for name in CASES)
+    _, out, _ = run("cases glass-beads")
+    assert "+- 0.01" in out
+    _, out, _ = run("cases --json")
+    assert [one["name"] for one in json.loads(out)["cases"]] == [*CASES]
+
+
+def test_a_case_makes_a_chute_in_python(file):
+    assert case("sand").chute(slope=0.35).restitution == 0.7
+    with pytest.raises(chuteflow.InputError, match="sand has no slope"):
+        case("sand").chute()
+    mine = read_chute(file)
+    assert mine.scales == chuteflow.Scales(1e-3, 2500.0)
+    assert mine.chute().roughness == 0.65
+
+
+# Units
+
+
+def test_a_flux_by_volume_is_one_by_mass(run):
+    grains = ["--diameter", "1 mm", "--density", "2500"]
+    _, by_volume, err = run(f"solve {PAPER} --json", grains, ["--flux", "0.0004 m2/s"])
+    assert not err
+    _, by_mass, _ = run(f"solve {PAPER} --json", grains, ["--flux", "1 kg/m/s"])
+    assert json.loads(by_volume)["flows"][0]["Q"] == pytest.approx(1.0, rel=1e-9)
+    assert json.loads(by_volume) == json.loads(by_mass)
+    _, by_depth, _ = run(f"solve {PAPER} --json", grains, ["--holdup", "0.5 mm"])
+    assert json.loads(by_depth)["flows"][0]["M"] == pytest.approx(1.25, rel=1e-9)
+
+
+def test_a_bare_number_beside_si_is_said_to_be_dimensionless(run):
+    words = f"solve {PAPER} --diameter 0.001 --density 2500 --flux 3 --json"
+    _, out, err = run(words)
+    assert "--flux 3 is taken as dimensionless, 0.72701 kg/m/s here" in err
+    assert json.loads(out)["flows"][0]["Q"] == pytest.approx(0.72701, rel=1e-4)
+    _, again, err = run(words, "--quiet")
+    assert (again, err) == (out, "")
+
+
+def test_a_range_searched_takes_units(run):
+    factor = chuteflow.Scales(1e-3, 2500.0).factor("surface_temperature", 0.3)
+    grains = ["--diameter", "1 mm", "--density", "2500"]
+    given = ["--search-temperature", f"{0.1 * factor!r}:{10.0 * factor!r} m2/s2", "--largest-holdup", "10 kg/m2"]
+    code, out, _ = run(f"solve {PAPER} --flux 3 --quiet --json", grains, given)
+    assert code == 0
+    searched = json.loads(out)["searched"]
+    assert searched["T_surface"] == pytest.approx([0.1 * factor, 10.0 * factor])
+    assert searched["M_max"] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "place", "quantity"),
+    [
+        ("curve --points 8", ("branches", 0, "Q"), "mass_flux"),
+        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "growth"), "growth"),
+        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "kx"), "wavenumber"),
+        ("relax --flux 3 --duration 1", ("t",), "time"),
+        ("relax --flux 3 --duration 1", ("T_base",), "base_temperature"),
+        ("compare-closures --with lun --flux 3", ("closures", 0, "flows", 0, "U"), "mean_velocity"),
+        ("boundary --slope 0.29:0.3 --samples 2 --search-temperature 0.1:10", ("boundaries", 0, "T_surface"), None),
+        ("hot", ("M",), "mass_holdup"),
+    ],
+)
+def test_si_scales_what_every_command_prints(run, words, place, quantity):
+    grains = "--diameter 0.002 --density 2500 --quiet"
+    of = PAPER.replace("--slope 0.3 ", "") if words.startswith("boundary") else PAPER
+    _, plain, _ = run(words, of, "--json")
+    code, scaled, _ = run(words, of, "--json", grains)
+    assert code == 0
+    one, other = json.loads(plain), json.loads(scaled)
+    if quantity is not None:
+        assert other["units"] if "closures" not in other else other["closures"][0]["units"]
+    for key in place:
+        one, other = one[key], other[key]
+    factor = chuteflow.Scales(0.002, 2500.0).factor(quantity or "surface_temperature", 0.3)
+    if quantity is None:  # on the slope of each point
+        one, other, factor = one[-1:], other[-1:], factor
+        assert other == pytest.approx([one[0] * factor], rel=1e-2)
+    elif isinstance(one, list):
+        assert other == pytest.approx([factor * value for value in one], rel=1e-12)
+    else:
+        assert other == pytest.approx(factor * one, rel=1e-12)
+
+
+# What is nearest
+
+
+def test_the_nearest_with_a_flow_has_one(run):
+    chute = chuteflow.Chute(0.2, 0.8, 0.8, 0.85)
+    found = nearest(chute, Q=3.0)
+    for name, value in found.parameters.items():
+        values = {**chute.as_dict(), name: value}
+        assert len(chuteflow.flows(chuteflow.Chute(**values), Q=3.0)) > 0, name
+    _, out, _ = run("solve --slope 0.2 --e 0.8 --ew 0.8 --roughness 0.85 --flux 3 --json")
+    near = json.loads(out)["nearest_with_flow"]
+    assert near["slope"] == found.parameters["slope"]
+    assert near["examined"]["slope"][0] < 0.2 < near["slope"] < near["examined"]["slope"][1]
+
+
+def test_the_nearest_flux_has_a_flow():
+    chute = case("sand").chute(slope=0.46)
+    found = nearest(chute, Q=3.0)
+    assert found.value is not None
+    assert 20.0 < found.value < 25.0
+    assert len(chuteflow.flows(chute, Q=found.value * 1.001)) > 0
+
+
+# The table of commands
+
+#: What does not make sense, by command: without a chute there is no case, no grains; what has no picture draws none.
+WITHOUT = {
+    "sweep": ("chute", "case", "si", "json", "save", "plot"),
+    "cases": ("chute", "case", "si", "save", "plot"),
+    "closures": ("chute", "case", "si"),
+    "figures": ("chute", "case", "si", "json", "save", "plot"),
+    "claims": ("chute", "case", "si", "save", "plot"),
+    "report": ("chute", "case", "si", "json", "save", "plot"),
+    "explore": ("chute", "case", "si", "json", "save", "plot", "quiet"),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_accepts_what_makes_sense(name):
+    command = program.get_command(click.Context(program), name)
+    accepted = {option.removeprefix("--") for param in command.params for option in param.opts}
+    wanted = {"chute", "case", "si", "json", "save", "plot", "quiet"} - set(WITHOUT.get(name, ()))
+    assert wanted <= accepted
+    assert accepted.isdisjoint(WITHOUT.get(name, ()))
+
+
+# Numbers of a flow
+
+
+@pytest.mark.parametrize("surface", ["free", "interface"])
+def test_the_numbers_that_follow_from_others(surface):
+    for flow in chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface=surface), Q=3.0):
+        profile = flow.sampled(20_001)
+        steps = profile.height[1] - profile.height[0]
+        mass = steps * (profile.volume_fraction.sum() - 0.5 * (profile.volume_fraction[[0, -1]].sum()))
+        assert flow.mean_velocity == pytest.approx(flow.mass_flux / flow.mass_holdup)
+        assert flow.mean_volume_fraction == pytest.approx(mass / flow.depth, rel=1e-7)
+        assert flow.froude_number == pytest.approx(flow.mean_velocity / math.sqrt(flow.depth))
+        top = flow.depth * (5.0 if surface == "free" else 1.0)
+        assert flow.surface_velocity == pytest.approx(float(flow.profile([top]).velocity[0]), rel=1e-9)
