@@ -43,17 +43,16 @@ def answer(capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
-def test_a_fit_is_printed_saved_drawn_and_predicted_from(flow, tmp_path, capsys):
+def test_a_fit_is_printed_saved_and_predicted_from(flow, tmp_path, capsys):
     data = written(tmp_path / "data.csv", flow, noise=0.03)
     known = ["--slope", "0.3", "--ew", "0.8", "--roughness", "0.6"]
-    out, picture, direct = (str(tmp_path / name) for name in ("fit.nc", "fit.png", "direct.png"))
+    out = str(tmp_path / "fit.nc")
     command = ["fit", data, *known, "--free", "e", "--trials", "2"]
-    assert main([*command, "--out", out, "--plot", picture, "--direct", direct]) == DONE
+    assert main([*command, "--out", out]) == DONE
     text = capsys.readouterr().out
     assert "flow 3 of 3" in text
     assert "errors were not given" in text
     assert "measured without a model" in text
-    assert all((tmp_path / name).stat().st_size > 1000 for name in ("fit.nc", "fit.png", "direct.png"))
     (found,) = answer(capsys, *command, "--out", str(tmp_path / "fit.json"))["fits"]
     estimate = found["estimates"]["e"]
     assert estimate["interval"][0] < 0.8 < estimate["interval"][1]
@@ -63,8 +62,7 @@ def test_a_fit_is_printed_saved_drawn_and_predicted_from(flow, tmp_path, capsys)
         loaded = load_calibration(tmp_path / name)
         assert loaded.chute.restitution == estimate["value"]
         assert loaded.covariance[0, 0] == found["covariance"][0][0]
-    plot = str(tmp_path / "prediction.png")
-    predicted = answer(capsys, "predict", out, "--slope", "0.29", "--flux", "3", "--plot", plot)
+    predicted = answer(capsys, "predict", out, "--slope", "0.29", "--flux", "3")
     assert predicted["parameters"] == ["e"]
     assert predicted["chute"]["slope"] == 0.29
     assert all(0.0 < one["errors"]["M"] < 0.1 for one in predicted["flows"])
@@ -72,6 +70,18 @@ def test_a_fit_is_printed_saved_drawn_and_predicted_from(flow, tmp_path, capsys)
     known_all = answer(capsys, "predict", out, "--e", "0.8", "--flux", "3")
     assert known_all["parameters"] == []
     assert known_all["flows"][0]["errors"]["M"] == 0.0
+
+
+@pytest.mark.slow
+def test_fits_predictions_and_sensitivities_are_drawn(flow, tmp_path):
+    data = written(tmp_path / "data.csv", flow, noise=0.03)
+    out, *pictures = (str(tmp_path / name) for name in ("fit.nc", "fit.png", "direct.png", "prediction.png", "s.png"))
+    known = ["--slope", "0.3", "--ew", "0.8", "--roughness", "0.6"]
+    fitted = ["fit", data, *known, "--free", "e", "--trials", "2", "--out", out]
+    assert main([*fitted, "--plot", pictures[0], "--direct", pictures[1]]) == DONE
+    assert main(["predict", out, "--flux", "3", "--plot", pictures[2]]) == DONE
+    assert main(["sensitivities", *PAPER, "--flux", "3", "--plot", pictures[3]]) == DONE
+    assert all((tmp_path / picture).stat().st_size > 1000 for picture in pictures)
 
 
 def series(experiment, symbol):
@@ -187,10 +197,8 @@ def test_a_damaged_fit_is_refused(tmp_path, capsys):
         assert "cannot load" in capsys.readouterr().err
 
 
-def test_sensitivities_are_printed_and_drawn(flow, tmp_path, capsys):
-    picture = tmp_path / "s.png"
-    found = answer(capsys, "sensitivities", *PAPER, "--flux", "3", "--plot", str(picture))
-    assert picture.stat().st_size > 1000
+def test_sensitivities_are_printed_and_saved(flow, tmp_path, capsys):
+    found = answer(capsys, "sensitivities", *PAPER, "--flux", "3")
     assert len(found["flows"]) == 3
     last = found["flows"][-1]
     assert last["derivatives"]["M"]["slope"] == pytest.approx(flow.sensitivity(["slope"]).numbers["mass_holdup"][0])

@@ -23,7 +23,7 @@ from chuteflow.threads import on_one_thread
 #: Relative differences of the numbers that count as one error, and the largest sum of squares of a solution.
 _ERROR, _MET = 1e-3, 1e-11
 #: Starts that are followed, trial chutes, and evaluations.
-_FOLLOWED, _TRIALS, _MOST = 16, 96, 60
+_FOLLOWED, _TRIALS, _MOST = 16, 48, 60
 #: Solutions whose parameters and logarithms differ by less are one.
 _SAME = 1e-5
 
