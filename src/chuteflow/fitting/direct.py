@@ -4,7 +4,8 @@
 # velocity; g1 = p/T, g2 = s p/(sqrt(T) du/dz), and F1 = u/sqrt(T) at the base.
 
 The normal stress is the weight of the grains above (3.4), and the shear stress s times that (3.5), whatever the grains
-are. Above the highest value nu falls off exponentially, at the rate of the values below. Errors come from many draws of
+are. Above the highest value nu is taken to fall off exponentially, at the rate of the values below, and what is there
+to be known to a half. Errors come from many draws of
 the measurements within their own.
 """
 
@@ -26,6 +27,8 @@ from chuteflow.theory.constitutive import Law, reduce
 _DRAWS = 400
 #: Values that a slope is taken from, and those of the tail.
 _WINDOW, _TAIL = 5, 4
+#: Relative error of the part of the stress that is above the highest value.
+_TAIL_ERROR = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,8 @@ def direct(experiment: Experiment, chute: Chute, *, error_scale: float = 1.0, se
     rng = np.random.default_rng(seed)
     draws = _draws(nu, rng, error_scale)
     picked = np.searchsorted(nu.height, height)
-    stress = _stresses(nu.height, draws, surface_stress(chute.surface))[:, picked]
+    tails = np.append(1.0, np.exp(_TAIL_ERROR * rng.standard_normal(_DRAWS)))
+    stress = _stresses(nu.height, draws, surface_stress(chute.surface), tails)[:, picked]
     t = _draws(temperature, rng, error_scale)[:, np.searchsorted(temperature.height, height)]
     density = draws[:, picked]
     law, e, slope = chute.law, chute.restitution, chute.slope
@@ -121,8 +125,9 @@ def _draws(series: Series, rng: np.random.Generator, scale: float) -> Array:
     return series.value * np.exp(noise) if series.relative else np.maximum(series.value + noise, 1e-12)
 
 
-def _stresses(z: Array, nu: Array, top: float) -> Array:
-    """Integrals of nu (k, m) over the heights above each, with an exponential tail, or ``top`` at an interface."""
+def _stresses(z: Array, nu: Array, top: float, tails: Array) -> Array:
+    """Integrals of nu (k, m) over the heights above each, with an exponential tail times ``tails`` (k,), or ``top`` at
+    an interface."""
     log_nu = np.log(nu)
     step = np.diff(z)
     # The mean of nu on an interval on which it goes exponentially.
@@ -137,7 +142,7 @@ def _stresses(z: Array, nu: Array, top: float) -> Array:
     centred = z[tail] - z[tail].mean()
     decay = -(log_nu[:, tail] @ centred) / (centred @ centred)
     # Where values do not fall off there is no end: at least the last height again.
-    return found + (nu[:, -1] / np.maximum(decay, 1.0 / max(float(z[-1]), 1e-12)))[:, None]
+    return found + (tails * nu[:, -1] / np.maximum(decay, 1.0 / max(float(z[-1]), 1e-12)))[:, None]
 
 
 def _slopes(z: Array) -> Array:
