@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, curve, flows, load, save
+from chuteflow import Chute, Flow, InputError, curve, flows, load, save
 from chuteflow.numerics.complex_step import STEP
 from chuteflow.steady.collocation import LOG_Q
 from chuteflow.steady.free import all_free, free_parameter, varied
@@ -165,7 +165,9 @@ def test_profiles_at_a_share_of_the_mass_follow_the_grains():
 def test_a_flow_from_a_file_has_the_same_derivatives(tmp_path):
     flow = coldest(CHUTE, {"Q": 3.0})
     save(flow, tmp_path / "flow.json")
-    loaded = load(tmp_path / "flow.json").sensitivity(["e"]).numbers
+    found = load(tmp_path / "flow.json")
+    assert isinstance(found, Flow)
+    loaded = found.sensitivity(["e"]).numbers
     for name, values in flow.sensitivity(["e"]).numbers.items():
         np.testing.assert_allclose(loaded[name], values, rtol=1e-9, err_msg=name)
 

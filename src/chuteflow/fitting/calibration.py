@@ -526,7 +526,7 @@ def _fitted(case: Case, place: Place, base: float | None, base_error: float | No
 
 def _rank(case: Case, place: Place) -> tuple[int, int]:
     """Which of the flows with the same exact number, or the same hold-up, this is."""
-    asked = dict(case.experiment.exact) or {"M": place.flow.mass_holdup}
+    asked: dict[str, Any] = dict(case.experiment.exact) or {"M": place.flow.mass_holdup}
     from chuteflow.branches.enumeration import flows
 
     found = flows(place.flow.chute, **asked, tolerance=1e-6)

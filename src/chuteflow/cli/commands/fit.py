@@ -44,7 +44,8 @@ class Range(click.ParamType):
         name, equals, text = str(value).partition("=")
         if not (equals and name.strip()):
             self.fail(f"{value!r} is not a range: write NAME=LO:HI, for example e=0.7:0.95", param, ctx)
-        return name.strip(), options.Interval().convert(text, param, ctx)
+        ends: Any = options.Interval().convert(text, param, ctx)
+        return name.strip(), ends
 
 
 @click.command("fit", help=COMMANDS["fit"], epilog=_EPILOG)
