@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow import display
+from chuteflow.branches.enumeration import flows
 from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.fitting.direct import DirectMeasurement, direct
@@ -527,8 +528,6 @@ def _fitted(case: Case, place: Place, base: float | None, base_error: float | No
 def _rank(case: Case, place: Place) -> tuple[int, int]:
     """Which of the flows with the same exact number, or the same hold-up, this is."""
     asked: dict[str, Any] = dict(case.experiment.exact) or {"M": place.flow.mass_holdup}
-    from chuteflow.branches.enumeration import flows
-
     found = flows(place.flow.chute, **asked, tolerance=1e-6)
     if not len(found):
         return 1, 1
