@@ -30,7 +30,7 @@ METADATA := pyproject.toml $(wildcard README.md LICENSE)
 # Looked up by the shell, not by $(wildcard), which would remember the folder as it was before the build.
 WHEEL = $$(echo dist/chuteflow-*.whl)
 
-.PHONY: help demo test test-all lint types unit docs bench wheel dist clean
+.PHONY: help demo test test-all lint types unit docs man bench wheel dist clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
@@ -62,6 +62,9 @@ types: $(VENV)/.packages-test ## types of the code
 docs: $(VENV)/.compiled $(VENV)/.packages-test ## build the documentation into build/docs/, without network
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs build/docs
 	@echo "The documentation is at $(CURDIR)/build/docs/index.html"
+
+man: $(VENV)/.compiled $(VENV)/.packages-test ## build the manual page build/man/chuteflow.1
+	$(BIN)/sphinx-build --quiet -b man -t quick docs build/man
 
 bench: $(VENV)/.compiled $(VENV)/.packages-bench ## time the solver, beside what one would pick instead
 	$(BIN)/python benchmarks/run.py

@@ -45,6 +45,8 @@ python_maximum_signature_line_length = 100
 add_module_names = False
 napoleon_numpy_docstring = False
 
+man_pages = [("reference/commands", "chuteflow", "steady flows of grains down a chute", [author], 1)]
+
 html_theme = "furo"
 html_title = "chuteflow"
 html_static_path = ["_static"]

@@ -46,7 +46,10 @@ class NotebookParser(Parser):
 def run(source: str, names: dict[str, Any]) -> list[str]:
     """What a cell shows, as parts of a page: what it prints, and its last value unless a semicolon ends it."""
     tree = ast.parse(source)
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    end = tree.body[-1] if tree.body else None
+    last = end if isinstance(end, ast.Expr) else None
+    if last is not None:
+        tree.body.pop()
     written = StringIO()
     folder = names.setdefault("__folder__", tempfile.mkdtemp())
     before = os.getcwd()

@@ -42,8 +42,11 @@ class Result(Compared):
     """A result that draws itself, :meth:`plot`, and becomes a table, :meth:`to_dataframe` or :meth:`to_xarray`."""
 
     def plot(self, *, scales: Any = None, **options: Any) -> Any:
-        """Draw the result, in SI units where ``scales`` (:class:`chuteflow.Scales`) are given; ``options`` are those of
-        its picture.
+        """Draw the result, in SI units where ``scales`` (:class:`chuteflow.Scales`) are given.
+
+        Args:
+            scales: the grains.
+            options: ``theme``, "print" (the default) or "slides", and those of its picture.
 
         Returns matplotlib's axes: one, or an array of them where the picture has several panels. Their figure is
         ``axes.figure``, of which a notebook shows a copy.

@@ -186,13 +186,23 @@ def test_a_range_searched_takes_units(run):
     ("words", "place", "quantity"),
     [
         ("curve --points 8", ("branches", 0, "Q"), "mass_flux"),
-        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "growth"), "growth"),
-        ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "kx"), "wavenumber"),
-        ("relax --flux 3 --duration 1", ("t",), "time"),
-        ("relax --flux 3 --duration 1", ("T_base",), "base_temperature"),
+        ("relax --flux 3 --duration 0.01", ("t",), "time"),
+        ("relax --flux 3 --duration 0.01", ("T_base",), "base_temperature"),
         ("compare-closures --with lun --flux 3", ("closures", 0, "flows", 0, "U"), "mean_velocity"),
-        ("boundary --slope 0.29:0.3 --samples 2 --search-temperature 0.1:10", ("boundaries", 0, "T_surface"), None),
         ("hot", ("M",), "mass_holdup"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "growth"), "growth"),
+                ("stability --flux 3 --kx 0.01 --ky 0", ("flows", 0, "mode", "kx"), "wavenumber"),
+                ("growth --flux 3 --kx 0:0.02 --ky 0:0.02 --size 4x4", ("kx",), "wavenumber"),
+                (
+                    "boundary --slope 0.29:0.3 --samples 2 --search-temperature 0.1:10",
+                    ("boundaries", 0, "T_surface"),
+                    None,
+                ),
+            )
+        ),
     ],
 )
 def test_si_scales_what_every_command_prints(run, words, place, quantity):
@@ -258,6 +268,7 @@ WITHOUT = {
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_accepts_what_makes_sense(name):
     command = program.get_command(click.Context(program), name)
+    assert command is not None
     accepted = {option.removeprefix("--") for param in command.params for option in param.opts}
     wanted = {"chute", "case", "si", "json", "save", "plot", "quiet"} - set(WITHOUT.get(name, ()))
     assert wanted <= accepted
@@ -267,7 +278,7 @@ def test_every_command_accepts_what_makes_sense(name):
 # Numbers of a flow
 
 
-@pytest.mark.parametrize("surface", ["free", "interface"])
+@pytest.mark.parametrize("surface", ["free", pytest.param("interface", marks=pytest.mark.slow)])
 def test_the_numbers_that_follow_from_others(surface):
     for flow in chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface=surface), Q=3.0):
         profile = flow.sampled(20_001)
@@ -278,3 +289,56 @@ def test_the_numbers_that_follow_from_others(surface):
         assert flow.froude_number == pytest.approx(flow.mean_velocity / math.sqrt(flow.depth))
         top = flow.depth * (5.0 if surface == "free" else 1.0)
         assert flow.surface_velocity == pytest.approx(float(flow.profile([top]).velocity[0]), rel=1e-9)
+
+
+# Pictures, names and completion
+
+
+def test_a_picture_is_written_in_several_formats(run, tmp_path):
+    code, _, _ = run(f"solve {PAPER} --flux 3 --plot", [str(tmp_path / "a.b.png,pdf,svg")])
+    assert code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.b.pdf", "a.b.png", "a.b.svg"]
+    assert (tmp_path / "a.b.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_slides_have_larger_text(run, tmp_path):
+    from matplotlib.image import imread
+
+    for name in ("print", "slides"):
+        run(f"solve {PAPER} --flux 3 --theme {name} --plot", [str(tmp_path / f"{name}.png")])
+    small, large = (imread(tmp_path / f"{name}.png").shape for name in ("print", "slides"))
+    assert large[0] > 1.2 * small[0]
+    axes = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0).plot(theme="slides")
+    assert axes[0].xaxis.label.get_fontsize() > 1.4 * 9.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--theme slides", "there is no picture, give --plot too"),
+        ("--theme neon --plot a.png", "unknown theme 'neon': choose one of print, slides"),
+        ("--plot a.png,gif", "the name must end in .png, .pdf or .svg"),
+    ],
+)
+def test_a_picture_that_cannot_be_is_one_line(run, words, said):
+    code, out, err = run(f"solve {PAPER} --flux 3", words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_long_names_are_those_of_python(run):
+    _, short, _ = run(f"solve {PAPER} --flux 3 --json")
+    _, long, _ = run("solve --slope 0.3 --restitution 0.8 --wall-restitution 0.8 --roughness 0.6 --mass-flux 3 --json")
+    assert long == short
+    flow = chuteflow.flows(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), Q=3.0)[0]
+    assert (flow.Q, flow.h, flow.chute.e) == (flow.mass_flux, flow.centre_of_mass, 0.8)
+    with pytest.raises(AttributeError, match="no attribute 'colour'"):
+        _ = flow.colour
+
+
+def test_a_shell_completes_cases(capsys, monkeypatch):
+    monkeypatch.setenv("_CHUTEFLOW_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", "chuteflow solve --case s")
+    monkeypatch.setenv("COMP_CWORD", "3")
+    main([])
+    assert capsys.readouterr().out.split() == ["plain,steel", "plain,sand"]

@@ -28,6 +28,8 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 #: Endings of the files that --save and --plot write.
 SAVED, DRAWN = (".nc", ".csv", ".json"), (".png", ".pdf", ".svg")
 
+_SEVERAL = re.compile(r"(.+)\.((?:png|pdf|svg)(?:,(?:png|pdf|svg))+)", re.IGNORECASE)
+
 #: The conditions by their options.
 _CONDITIONS = {condition.option: condition for condition in CONDITIONS.values()}
 #: The case, or file of a chute, that holds where neither --chute nor --case is given.
@@ -138,6 +140,11 @@ def _opening(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _names(key: str) -> tuple[str, ...]:
+    """The option of a parameter, by its key and by its name in Python."""
+    return tuple(dict.fromkeys(f"--{name.replace('_', '-')}" for name in (key, BY_KEY[key].name)))
+
+
 def _described(command: Command) -> Command:
     """``command`` with what the chute's file or case says in the place of options that are not given."""
 
@@ -191,11 +198,18 @@ def _case(path: str | None, name: str | None) -> Case | None:
         raise InputError(f"{CASE_VARIABLE}: {error}") from None
 
 
+def _completed_case(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    from chuteflow.steady.cases import CASES
+
+    return [name for name in CASES if name.startswith(incomplete)]
+
+
 case_options = _options(
     option("--chute", "chute_file", metavar="FILE", help="A TOML file that describes the chute; options override it."),
     option(
         "--case",
         metavar="NAME",
+        shell_complete=_completed_case,
         help="A chute or material of `chuteflow cases`; options override it. "
         f"Where neither is given, ${CASE_VARIABLE} may name one.",
     ),
@@ -235,7 +249,7 @@ chute_options = _options(
     option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
     option("--angle", type=Number(), help="Inclination theta in degrees."),
     *(
-        option(f"--{key}", type=Number(), help=f"{_opening(parameter.description)}, {parameter.allowed}.")
+        option(*_names(key), type=Number(), help=f"{_opening(parameter.description)}, {parameter.allowed}.")
         for key, parameter in BY_KEY.items()
         if key != "slope"
     ),
@@ -252,7 +266,7 @@ def range_options(slope: str) -> Callable[[Command], Command]:
         option("--slope", type=NumberOrInterval(), help=f"Slope tan(theta) of the chute; LO:HI {slope}."),
         option("--angle", type=Number(), help="Inclination theta in degrees, instead of --slope."),
         *(
-            option(f"--{key}", type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
+            option(*_names(key), type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
             for key, parameter in BY_KEY.items()
             if key != "slope"
         ),
@@ -262,10 +276,15 @@ def range_options(slope: str) -> Callable[[Command], Command]:
 
 
 condition_options = _options(
-    option("--flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
-    option("--holdup", metavar="AMOUNT", help="Mass hold-up M, mass per unit area of the base."),
+    option("--flux", "--mass-flux", metavar="AMOUNT", help="Mass flux Q per unit width."),
+    option("--holdup", "--mass-holdup", metavar="AMOUNT", help="Mass hold-up M, mass per unit area of the base."),
     option("--centre-of-mass", "--depth", metavar="AMOUNT", help="Height h of the centre of mass."),
-    option("--temperature", metavar="AMOUNT", help="Granular temperature far above, or at the interface."),
+    option(
+        "--temperature",
+        "--surface-temperature",
+        metavar="AMOUNT",
+        help="Granular temperature far above, or at the interface.",
+    ),
 )
 search_range_options = _options(
     option(
@@ -296,7 +315,22 @@ def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[
 
 
 def _plot_option(what: str) -> Callable[[Command], Command]:
-    return option("--plot", metavar="FILE", help=f"Draw {what}{' ' if what else ''}into FILE: .png, .pdf or .svg.")
+    return _options(
+        option(
+            "--plot",
+            metavar="FILE",
+            help=f"Draw {what}{' ' if what else ''}into FILE: .png, .pdf or .svg, or several as in flows.png,pdf.",
+        ),
+        option("--theme", metavar="NAME", help="Look of the picture: print (the default) or slides, with larger text."),
+    )
+
+
+def picture_files(path: str) -> list[str]:
+    """The files that --plot names: one, or as in "flows.png,pdf" one for each ending."""
+    several = _SEVERAL.fullmatch(path)
+    if several is None:
+        return [path]
+    return [f"{several[1]}.{ending}" for ending in dict.fromkeys(several[2].split(","))]
 
 
 def chute(given: Mapping[str, Any]) -> Chute:
@@ -569,7 +603,9 @@ def deliver(
         from chuteflow.plotting.plots import write_figure
 
         with style.own_settings():
-            write_figure(figure(), path)
+            drawn = style.themed(figure(), given.get("theme") or "print")
+            for one in picture_files(path):
+                write_figure(drawn, one)
 
     failures = []
     writers = {"save": save} | {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
@@ -592,6 +628,14 @@ def require_outputs(given: Mapping[str, Any], saved: Sequence[str] = SAVED) -> N
     """
     from chuteflow.io.writing import require_writable
 
-    for name, suffixes in (("save", saved), ("plot", DRAWN)):
-        if given[name] is not None:
-            require_writable(given[name], suffixes)
+    if given["save"] is not None:
+        require_writable(given["save"], saved)
+    if given["plot"] is not None:
+        for path in picture_files(given["plot"]):
+            require_writable(path, DRAWN)
+    if given["theme"] is not None:
+        from chuteflow.plotting.style import require_theme
+
+        require_theme(given["theme"])
+        if given["plot"] is None:
+            raise InputError(f"--theme {given['theme']}: there is no picture, give --plot too")

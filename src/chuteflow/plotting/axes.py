@@ -37,14 +37,15 @@ if TYPE_CHECKING:
 _DPI = 110
 
 
-def plot(result: Any, *, scales: Scales | None = None, **options: Any) -> Any:
-    """Draw ``result``, and return the axes: one, or an array of them. In a notebook the picture is shown.
+def plot(result: Any, *, scales: Scales | None = None, theme: str = "print", **options: Any) -> Any:
+    """Draw ``result`` in the look of a ``theme``, and return the axes: one, or an array of them. In a notebook the
+    picture is shown.
 
     Raises:
         InputError: for a result without a picture, or an option that it does not have.
     """
     try:
-        figure = drawn(result, scales, **options)
+        figure = style.themed(drawn(result, scales, **options), theme)
     except TypeError as error:
         if "unexpected keyword argument" not in str(error):
             raise

@@ -55,10 +55,16 @@ def plot_scan(found: Scan, quantity: str | None = None, *, scales: Scales | None
     if quantity is not None and quantity not in found.quantities:
         raise InputError(f"unknown quantity {quantity!r}: the study has {', '.join(found.quantities)}")
     if len(found.axes) == 1:
-        return _over_one(found, quantity or next(iter(found.quantities)), scales)
+        return _over_one(found, quantity or _telling(found), scales)
     if len(found.axes) == 2:
         return _over_two(found, quantity, scales)
     raise InputError(f"a study over {len(found.axes)} axes has no picture: fix all but two, or take it as a table")
+
+
+def _telling(found: Scan) -> str:
+    """A number that is not the condition itself."""
+    asked = {CONDITIONS[name].quantity for name in (*found.axes, *found.fixed) if name in CONDITIONS}
+    return next((name for name in found.quantities if name not in asked), next(iter(found.quantities)))
 
 
 def _over_one(found: Scan, quantity: str, scales: Scales | None) -> Figure:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chuteflow.errors import InputError
 from chuteflow.steady.quantities import SCALED, Scales
 
 if TYPE_CHECKING:
@@ -97,6 +98,60 @@ def _import_matplotlib() -> None:
         os.environ["MPLBACKEND"] = backend
     with suppress(ValueError):
         matplotlib.rcParams["backend"] = backend
+
+
+@dataclass(frozen=True)
+class Theme:
+    """How much larger than in print a figure, its text and its lines are."""
+
+    figure: float = 1.0
+    text: float = 1.0
+    lines: float = 1.0
+
+
+#: Looks of figures: for a page, and to be seen from the last row.
+THEMES = {"print": Theme(), "slides": Theme(figure=1.3, text=1.6, lines=1.6)}
+
+
+def require_theme(name: str) -> None:
+    """Check the name of a theme.
+
+    Raises:
+        InputError: for an unknown one.
+    """
+    if name not in THEMES:
+        raise InputError(f"unknown theme {name!r}: choose one of {', '.join(THEMES)}")
+
+
+def themed(figure: Figure, name: str) -> Figure:
+    """``figure``, which is in the look of print, in that of the theme ``name``.
+
+    Raises:
+        InputError: for an unknown theme.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.text import Text
+
+    require_theme(name)
+    theme = THEMES[name]
+    if theme == THEMES["print"]:
+        return figure
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(theme.figure * width, theme.figure * height)
+    # Legends and captions are as wide as the figure already.
+    across = {text for part in (*figure.legends, *figure.texts) for text in part.findobj(Text)}
+    for text in figure.findobj(Text):
+        factor = theme.figure if text in across else theme.text
+        text.set_fontsize(factor * float(text.get_fontsize()))  # pyright: ignore[reportAttributeAccessIssue]
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            for which in ("major", "minor"):
+                size: Any = axis.get_tick_params(which=which).get("labelsize", _SIZE)
+                axis.set_tick_params(which=which, labelsize=theme.text * size)
+        for line in ax.findobj(Line2D):
+            line.set_linewidth(theme.lines * line.get_linewidth())  # pyright: ignore[reportAttributeAccessIssue]
+            line.set_markersize(theme.lines * line.get_markersize())  # pyright: ignore[reportAttributeAccessIssue]
+    return figure
 
 
 def stroke(index: int) -> Stroke:

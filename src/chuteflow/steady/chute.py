@@ -63,6 +63,16 @@ class Chute:
         return cls(slope=slope_of(degrees), **others)
 
     @property
+    def e(self) -> float:
+        """The restitution."""
+        return self.restitution
+
+    @property
+    def ew(self) -> float:
+        """The wall restitution."""
+        return self.wall_restitution
+
+    @property
     def angle(self) -> float:
         """Inclination theta in degrees."""
         return math.degrees(math.atan(self.slope))

@@ -22,7 +22,7 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, State, stre
 from chuteflow.steady.kinds import density_kind, interior_kind
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 from chuteflow.steady.names import name_of
-from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE
+from chuteflow.steady.quantities import BY_SYMBOL, FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
@@ -128,6 +128,13 @@ class Flow(Result):
 
     def _mark(self) -> bytes:
         return self.solution.macroscopic.tobytes()
+
+    def __getattr__(self, symbol: str) -> float:
+        """A number by its symbol, such as Q, h, M and T_surface."""
+        name = BY_SYMBOL.get(symbol)
+        if name is None:
+            raise AttributeError(f"'Flow' object has no attribute {symbol!r}")
+        return getattr(self, name)
 
     @property
     def name(self) -> str:

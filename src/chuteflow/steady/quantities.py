@@ -177,6 +177,9 @@ NUMBERS: dict[str, Quantity] = {
     )
 }
 
+#: Names of the numbers by their symbols.
+BY_SYMBOL = {quantity.symbol: name for name, quantity in NUMBERS.items() if quantity.symbol != name}
+
 #: The numbers that place a flow on a curve.
 PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 

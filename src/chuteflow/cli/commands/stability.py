@@ -71,7 +71,8 @@ def command(as_json: bool, **given: Any) -> None:
     if given["budget"] is not None:
         from chuteflow.io.writing import require_writable
 
-        require_writable(given["budget"], options.DRAWN)
+        for path in options.picture_files(given["budget"]):
+            require_writable(path, options.DRAWN)
     from chuteflow.branches.enumeration import flows
     from chuteflow.stability.modes import check_wavenumbers
 
