@@ -58,9 +58,7 @@ class Range(click.ParamType):
 @options.option("--loss", metavar="NAME", help="linear (the default), or soft_l1, huber, cauchy for outliers.")
 @options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
 @options.option("--trials", type=click.INT, help="Trial chutes that the search starts from; 64 for one experiment.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.quiet_option
-@options.option("--plot", metavar="FILE", help="Draw measurements, fit and residuals into FILE: .png, .pdf or .svg.")
+@options.output_options((), "measurements, fit and residuals")
 @options.option(
     "--direct", metavar="FILE", help="Draw g1 and g2 as measured without a model, beside the law, into FILE."
 )
@@ -68,7 +66,7 @@ class Range(click.ParamType):
 def command(**given: Any) -> None:
     """Read, fit, print, save and draw."""
     options.require_outputs(given, (".nc", ".json"))
-    options.require_outputs({"save": None, "plot": given["direct"]})
+    options.require_outputs({"save": None, "plot": given["direct"], "theme": None})
     free = _names(given["free"])
     closures = _closures(given)
     # The slope may come with the file.
