@@ -6,11 +6,13 @@ Those that a page draws itself while it is built are not among them.
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 IMAGES = Path(__file__).parent / "images"
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
@@ -27,6 +29,21 @@ def draw(name: str) -> None:
     """Draw the picture of one command."""
     command = [sys.executable, "-m", "chuteflow", *COMMANDS[name].split(), "--plot", str(IMAGES / f"{name}.png")]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def predict(name: str) -> None:
+    """Draw the prediction of the page on calibration, from its measurements and by its commands."""
+    page = IMAGES.parent / "calibration.md"
+    text = page.read_text(encoding="utf-8")
+    written = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    commands = re.findall(r"^chuteflow ((?:fit|predict) .*(?:--out|--flux) .*)$", text, re.MULTILINE)
+    assert written is not None
+    with TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-c", written[1]], check=True, cwd=folder)
+        for command in commands:
+            drawn = ["--plot", str(IMAGES.resolve() / f"{name}.png")] if command.startswith("predict") else []
+            words = [sys.executable, "-m", "chuteflow", *shlex.split(command), *drawn]
+            subprocess.run(words, check=True, stdout=subprocess.DEVNULL, cwd=folder)
 
 
 def photograph(name: str) -> None:
@@ -56,7 +73,11 @@ def photograph(name: str) -> None:
 
 def main() -> None:
     """Draw the pictures that are named, or all."""
-    pictures: dict[str, Callable[[str], None]] = {**dict.fromkeys(COMMANDS, draw), "explorer": photograph}
+    pictures: dict[str, Callable[[str], None]] = {
+        **dict.fromkeys(COMMANDS, draw),
+        "prediction": predict,
+        "explorer": photograph,
+    }
     for name in sys.argv[1:] or pictures:
         pictures[name](name)
         print(name, flush=True)

@@ -9,7 +9,7 @@ import pytest
 
 from chuteflow import Chute, InputError, Scales, boundary, curve, domain, flows
 from chuteflow.checks import number, number_in, real_array, shown, whole
-from chuteflow.cli.units import in_si
+from chuteflow.io.units import in_si
 from chuteflow.stability.planes import family_map, wave_map
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)

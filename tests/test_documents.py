@@ -57,7 +57,7 @@ def test_no_example_is_passed_over(page):
 
 def documented_names():
     text = (DOCS / "reference" / "json.md").read_text(encoding="utf-8")
-    return set(re.findall(r"`([\w-]+)`", text))
+    return set(re.findall(r"`([\w.-]+)`", text))
 
 
 def names_in(value):
@@ -83,6 +83,8 @@ def names_in(value):
         pytest.param("growth {chute} --flux 3 --kx 0:0.02 --ky 0:0.02 --size 4x4", marks=pytest.mark.slow),
         pytest.param("neutral {chute} --size 4x4 --search-temperature 1:10", marks=pytest.mark.slow),
         "relax {chute} --flux 3 --duration 1",
+        "sensitivities {chute} --flux 3 --flow 3",
+        pytest.param("design {chute} --unknown slope --flux 3 --holdup 1", marks=pytest.mark.slow),
     ],
     ids=lambda command: command.split()[0],
 )

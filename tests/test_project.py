@@ -29,6 +29,7 @@ LAYERS = (
     "maps",
     "stability",
     "sweeps",
+    "fitting",
     "io",
     "dem",
     "plotting",

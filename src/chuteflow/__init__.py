@@ -12,8 +12,14 @@ if TYPE_CHECKING:
     from chuteflow.branches.nearest import Nearest, nearest
     from chuteflow.branches.results import Branch, Curve, FlowSet, FlowSets, Searched, SpecialPoint
     from chuteflow.errors import ChuteflowError, InputError, SolveError
+    from chuteflow.fitting.calibration import Fit, fit
+    from chuteflow.fitting.comparison import compare
+    from chuteflow.fitting.design import design
+    from chuteflow.fitting.measurements import Measurements, measurements, together
+    from chuteflow.fitting.prediction import predict
     from chuteflow.io.chute_file import read_chute
     from chuteflow.io.files import load, save
+    from chuteflow.io.measurements_file import read_measurements
     from chuteflow.maps.domain import Domain, domain
     from chuteflow.stability.disturbed import growth, neutral, relax
     from chuteflow.stability.planes import FamilyMap, WaveMap
@@ -57,6 +63,15 @@ _HOMES = {
     "SolveError": "errors",
     "SpecialPoint": "branches.results",
     "Stability": "stability.verdict",
+    "Fit": "fitting.calibration",
+    "Measurements": "fitting.measurements",
+    "compare": "fitting.comparison",
+    "design": "fitting.design",
+    "fit": "fitting.calibration",
+    "measurements": "fitting.measurements",
+    "predict": "fitting.prediction",
+    "read_measurements": "io.measurements_file",
+    "together": "fitting.measurements",
     "Turning": "bifurcations.boundary",
     "WaveMap": "stability.planes",
     "boundary": "bifurcations.boundary",
@@ -89,11 +104,13 @@ __all__ = [
     "Curve",
     "Domain",
     "FamilyMap",
+    "Fit",
     "Flow",
     "FlowSet",
     "FlowSets",
     "HotModel",
     "InputError",
+    "Measurements",
     "Nearest",
     "Profile",
     "Quantity",
@@ -110,20 +127,27 @@ __all__ = [
     "boundary",
     "case",
     "closures",
+    "compare",
     "curve",
+    "design",
     "domain",
+    "fit",
     "flows",
     "growth",
     "hot",
     "load",
+    "measurements",
     "nearest",
     "neutral",
+    "predict",
     "read_chute",
+    "read_measurements",
     "relax",
     "save",
     "scan",
     "stability_of",
     "sweep",
+    "together",
 ]
 
 

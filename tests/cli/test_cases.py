@@ -254,6 +254,8 @@ def test_the_nearest_flux_has_a_flow():
 #: What does not make sense, by command: without a chute there is no case, no grains; what has no picture draws none.
 WITHOUT = {
     "sweep": ("chute", "case", "si", "json", "save", "plot"),
+    "predict": ("chute", "case", "si"),
+    "design": ("save", "plot"),
     "cases": ("chute", "case", "si", "save", "plot"),
     "closures": ("chute", "case", "si"),
     "figures": ("chute", "case", "si", "json", "save", "plot"),

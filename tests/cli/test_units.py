@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, Scales, flows
-from chuteflow.cli.units import in_si, read_amount, read_si
+from chuteflow.io.units import in_si, read_amount, read_si
 
 GRAINS = Scales(diameter=2e-3, density=2500.0)
 

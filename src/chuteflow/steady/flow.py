@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,9 @@ from chuteflow.steady.quantities import BY_SYMBOL, FIELDS, NUMBERS, PLACE
 from chuteflow.steady.solver import Solution
 from chuteflow.steady.validity import MEAN_FREE_PATH, Validity
 from chuteflow.theory.constitutive import Law
+
+if TYPE_CHECKING:
+    from chuteflow.steady.sensitivity import Sensitivity
 
 #: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
@@ -181,8 +185,7 @@ class Flow(Result):
     @property
     def slip_velocity(self) -> float:
         """u at the base, (3.15)."""
-        state = self._state
-        return float(self._model.slip(state.f[:, -1]) * np.exp(0.5 * state.log_t[-1]))
+        return float(self._slip)
 
     @cached_property
     def largest_volume_fraction(self) -> float:
@@ -335,6 +338,13 @@ class Flow(Result):
         points = whole("points", points, 1, _MOST_POINTS)
         return self.profile(np.linspace(0.0, self.depth if top is None else number("top", top), points))
 
+    def sensitivity(self, parameters: Sequence[str] | None = None, *, at: str = "Q") -> Sensitivity:
+        """Exact derivatives of all quantities and profiles with respect to parameters of the chute, see
+        :func:`chuteflow.steady.sensitivity.sensitivity`."""
+        from chuteflow.steady.sensitivity import sensitivity
+
+        return sensitivity(self, parameters, at=at)
+
     @property
     def _model(self) -> Model:
         return self.solution.problem.model
@@ -346,6 +356,16 @@ class Flow(Result):
     def _macroscopic(self, which: int) -> float:
         return float(np.exp(self.solution.macroscopic[which]))
 
+    @property
+    def _slip(self) -> Array:
+        state = self._state
+        return self._model.slip(state.f[:, -1]) * np.exp(0.5 * state.log_t[-1])
+
+    @property
+    def _limit(self) -> Array:
+        """The surface temperature; where T has no limit far above, of T p^beta."""
+        return np.exp(self.solution.macroscopic[LOG_T])
+
     @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
@@ -354,14 +374,17 @@ class Flow(Result):
         matrix = interpolation_matrix(problem.grid, s)
         g = matrix @ state.g
         theta = matrix @ state.theta
-        p = state.mass * share + self._model.surface_stress
+        return self._pointwise(state.mass * share + self._model.surface_stress, theta, g)
+
+    def _pointwise(self, p: Array, theta: Array, g: Array) -> tuple[dict[str, Array], Array]:
+        """What follows from the normal stress, the potential and its gradient, at any points."""
         x = self._model.density_argument(p, theta)
         f, _ = self._model.closures(x)
-        rise = p * g / state.mass - self._model.beta
+        rise = p * g / self._state.mass - self._model.beta
         fields = {
             "p": p,
             "nu": _density(x, f),
-            "y": f[CONDUCTION] * g / state.mass,
+            "y": f[CONDUCTION] * g / self._state.mass,
             "rise": rise,
             "log_t": self._model.log_temperature(p, theta, f[GAMMA]),
         }
@@ -410,7 +433,7 @@ class Flow(Result):
             beta = self._model.beta
             power = state.p[1:] ** -(1.0 + beta)
             regular = np.zeros_like(span)
-            regular[1:] = (per_fall[1:] / state.p[1:] - self.surface_temperature * power) * span[1:]
+            regular[1:] = (per_fall[1:] / state.p[1:] - self._limit * power) * span[1:]
         elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
@@ -420,7 +443,7 @@ class Flow(Result):
         glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
         height = g.integral @ regular
         velocity = g.integral @ glide
-        return height[-1] - height, self.slip_velocity + velocity[-1] - velocity
+        return height[-1] - height, self._slip + velocity[-1] - velocity
 
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
@@ -428,9 +451,9 @@ class Flow(Result):
         if self._model.unlimited:
             beta, mass = self._model.beta, self._state.mass[0]
             powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
-            z = z + self.surface_temperature / beta * powers
+            z = z + self._limit / beta * powers
         elif self._model.surface_stress == 0.0:
-            z = z - self.surface_temperature * np.log(np.maximum(share, _SMALLEST_SHARE))
+            z = z - self._limit * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
     @_vanishing
@@ -454,10 +477,14 @@ class Flow(Result):
 
     @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
-        at, f = self._at_share(share)
+        s = stretch_position(share, self.solution.problem.stretch)
+        velocity = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1]
+        return self._local(*self._at_share(share)) | {"velocity": velocity}
+
+    def _local(self, at: dict[str, Array], f: Array) -> dict[str, Array]:
+        """The fields that follow from what :meth:`_pointwise` gives."""
         slope, p, nu, rise = self._model.slope, at["p"], at["nu"], at["rise"]
         root_t = np.exp(0.5 * at["log_t"])
-        s = stretch_position(share, self.solution.problem.stretch)
         conducting, beta = f[CONDUCTION] * root_t, self._model.beta
         if beta == 0.0:
             conductive = conducting * (rise + f[COUPLING] * (1.0 - rise))
@@ -468,7 +495,6 @@ class Flow(Result):
         return {
             "volume_fraction": nu,
             "granular_temperature": root_t**2,
-            "velocity": interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1],
             "heat_flux": at["y"] * p * root_t,
             "conductive_heat_flux": conductive,
             "density_heat_flux": along_density,

@@ -70,7 +70,7 @@ def closure_table(closure: Law, e: float, slope: float, on: Base = BASES["richma
 def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
     b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
-    scaled_breaks = np.array([nu / (1.0 - nu / chosen.densest) for nu in breaks])
+    scaled_breaks = np.array([nu / (1.0 - nu / np.real(chosen.densest)) for nu in breaks])
     density = _density_table(chosen, e, slope, b, _coordinate(scaled_breaks).tolist())
     (log_ratio, _), _ = density(_coordinate(scaled_breaks))
     breaks_of_x = _coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
@@ -252,9 +252,8 @@ def _registered(chute: Chute, chosen: Law) -> Model:
             f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
             "take a larger e, the surface interface or the Fourier form of the closure"
         )
-    return _model(
-        chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, base(chute.base))
-    )
+    on = base(chute.base)
+    return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, on), on)
 
 
 def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Model]:
@@ -266,19 +265,35 @@ def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Mode
     """
     at = _parameters(chute) | {parameter: value}
     beyond: dict[str, Any] = at | {parameter: np.complex128(stepped(value))}
-    chosen = chute.law
-    table_beyond = closure_table(chosen, beyond["restitution"], beyond["slope"], base(chute.base))
+    chosen, on = chute.law, base(chute.base)
+    table_beyond = closure_table(chosen, beyond["restitution"], beyond["slope"], on)
     table = replace(table_beyond, coefficients=np.ascontiguousarray(table_beyond.coefficients.real))
-    return _model(chute, chosen, at, table), _model(chute, chosen, beyond, table_beyond)
+    return _model(chute, chosen, at, table, on), _model(chute, chosen, beyond, table_beyond, on)
+
+
+def stepped_model(chute: Chute, parameter: str) -> Model:
+    """The continuous problem of ``chute`` an imaginary step of one parameter further, see :func:`model_along`.
+
+    ``parameter`` is one of PARAMETERS, or ``closure.NAME`` or ``base.NAME`` for a parameter of the law or the base.
+    """
+    values: dict[str, Any] = _parameters(chute)
+    chosen, on = chute.law, base(chute.base)
+    where, _, name = parameter.rpartition(".")
+    if where == "closure":
+        chosen = chosen.stepped(name)
+    elif where == "base":
+        on = on.stepped(name)
+    else:
+        values[name] = np.complex128(stepped(values[name]))
+    return _model(chute, chosen, values, closure_table(chosen, values["restitution"], values["slope"], on), on)
 
 
 def _parameters(chute: Chute) -> dict[str, Any]:
     return {name: getattr(chute, name) for name in PARAMETERS}
 
 
-def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table) -> Model:
+def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table, on: Base) -> Model:
     slope, roughness = parameters["slope"], parameters["roughness"]
-    on = base(chute.base)
     loss, loss_by_second = on.loss(parameters["wall_restitution"], roughness)
     return Model(
         chute=chute,

@@ -239,9 +239,12 @@ def _iterated(start: Elements, weights: Array, value: float, step: float, *, rou
     return replace(found, step=np.inf)
 
 
-def resolve(near: Solution, condition: Condition, tolerance: float = TOLERANCE) -> Solution:
-    """The flow that meets ``condition``, from a neighbour."""
-    return solve(near.elements.adapted(_stretch(near)), condition, tolerance)
+def resolve(
+    near: Solution, condition: Condition, tolerance: float = TOLERANCE, problem: Model | None = None
+) -> Solution:
+    """The flow that meets ``condition``, from a neighbour, which may be of another ``problem``."""
+    start = near.elements.adapted(_stretch(near))
+    return solve(start if problem is None else replace(start, model=problem), condition, tolerance)
 
 
 def between(one: Solution, other: Solution, fraction: float) -> Elements:

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
+from chuteflow.numerics.complex_step import stepped
 from chuteflow.parameters import PARAMETERS
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Reduced
@@ -55,6 +57,12 @@ class Base:
     def parameters(self) -> dict[str, float]:
         """The parameters by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def stepped(self, name: str) -> Base:
+        """The base with one of its parameters an imaginary step further (:mod:`chuteflow.numerics.complex_step`)."""
+        found = copy(self)
+        object.__setattr__(found, name, stepped(getattr(self, name)))
+        return found
 
     def __str__(self) -> str:
         said = ",".join(f"{name}={value:g}" for name, value in self.parameters.items())

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.errors import InputError
+from chuteflow.numerics.complex_step import stepped
 
 #: An array of values at given states.
 Field = NDArray[Any]
@@ -150,6 +152,18 @@ class Law:
         spec = f"{self},{said}" if "=" in str(self).rpartition(":")[2] else f"{self}:{said}"
         return replace(Law.of(self.name, self.description, self.source, formula, self.valid), spec=spec)
 
+    def stepped(self, name: str) -> Law:
+        """The law with one of its parameters an imaginary step further (:mod:`chuteflow.numerics.complex_step`).
+
+        Its breaks stay where they are: the coefficients are continuous there.
+        """
+        formula: Any = copy(self.coefficients)
+        value = getattr(formula, name)
+        # No parameter that is a number has a default of its own other than the densest packing.
+        object.__setattr__(formula, name, stepped(self.densest if value is None else value))
+        object.__setattr__(formula, "breaks", getattr(self.coefficients, "breaks", self.breaks))
+        return replace(self, coefficients=formula, densest=formula.densest)
+
     def breaks_at(self, e: float, slope: float) -> tuple[float, ...]:
         """The volume fractions, ascending, at which a coefficient is not smooth at this restitution and slope.
 
@@ -159,7 +173,7 @@ class Law:
         own: Any = getattr(self.coefficients, "breaks", self.breaks)
         places: Any = own(e, slope) if callable(own) else own
         for nu in places:
-            if not 0.0 < nu < self.densest:
+            if not 0.0 < nu < np.real(self.densest):
                 raise InputError(
                     f"closure {self.name!r} has a break at nu = {nu:g}: must be above 0 and below {self.densest:g}"
                 )

@@ -50,7 +50,7 @@ class Radial:
                 "else: leave packing away, or take another radial function"
             )
         low = max((*self.breaks, 0.5))
-        if not (self.fixed or low < packing <= 0.74048):
+        if not (self.fixed or low < np.real(packing) <= 0.74048):
             raise InputError(f"packing = {packing:g}: must be above {low:g} and at most 0.74048 (spheres in a lattice)")
         return packing
 

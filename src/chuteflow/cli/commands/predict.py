@@ -1,0 +1,99 @@
+"""``chuteflow predict``: flows of a calibrated chute with bands, also at another slope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chuteflow.cli import options
+from chuteflow.cli.commands import COMMANDS
+from chuteflow.errors import InputError
+from chuteflow.parameters import BY_KEY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from chuteflow.fitting.prediction import Prediction
+
+_EPILOG = (
+    "What is given by an option is known; all else is as the fit says, with its uncertainty.\n\n"
+    "Example: chuteflow predict fit.nc --slope 0.32 --flux 3 --plot prediction.png"
+)
+_COLUMNS = (
+    "centre_of_mass",
+    "mass_holdup",
+    "surface_temperature",
+    "base_volume_fraction",
+    "slip_velocity",
+    "depth",
+)
+
+
+@click.command("predict", help=COMMANDS["predict"], epilog=_EPILOG)
+@click.argument("fitted", metavar="FIT")
+@options.option("--slope", type=options.Number(), help="Slope tan(theta); that of the fit by default.")
+@options.option("--angle", type=options.Number(), help="Inclination theta in degrees.")
+@options.option("--e", type=options.Number(), help="Another restitution of two grains.")
+@options.option("--ew", type=options.Number(), help="Another restitution of a grain and the base.")
+@options.option("--roughness", type=options.Number(), help="Another roughness of the base.")
+@options.condition_options
+@options.option("--confidence", type=options.Number(), help="Of the bands; 0.95 by default.")
+@options.output_options((".csv", ".json"), "curve and profiles with bands")
+def command(**given: Any) -> None:
+    """Load, predict, print, save and draw."""
+    options.require_outputs(given, (".csv", ".json"))
+    from chuteflow.fitting.prediction import predict
+    from chuteflow.io.fit_records import load_calibration, prediction_object, prediction_rows
+
+    calibration = load_calibration(given["fitted"])
+    if given["slope"] is not None and given["angle"] is not None:
+        raise InputError(f"--slope {given['slope']:g} and --angle {given['angle']:g}: give one of them, not both")
+    changes: dict[str, Any] = {p.name: given[key] for key, p in BY_KEY.items() if given[key] is not None}
+    if given["angle"] is not None:
+        changes["slope"] = _slope(given["angle"])
+    calibration = calibration.varied(**changes)
+    condition = options.condition(given, calibration.chute, None)
+    settings = {} if given["confidence"] is None else {"confidence": given["confidence"]}
+    found = predict(calibration, **settings, **condition)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.prediction_plot import plot_prediction
+
+        return plot_prediction(found)
+
+    content = prediction_object(found) if given["as_json"] or str(given["save"]).endswith(".json") else None
+    options.deliver_object(given, content, _report(found), lambda: prediction_rows(found), plotted)
+
+
+def _slope(degrees: float) -> float:
+    import math
+
+    from chuteflow.checks import number
+
+    return math.tan(math.radians(number("angle", degrees, 1e-6, 89.9999)))
+
+
+def _report(found: Prediction) -> Iterator[str]:
+    from chuteflow.io import tables, words
+    from chuteflow.steady.quantities import NUMBERS
+
+    yield words.chute(found.calibration.chute)
+    yield f"uncertain: {', '.join(found.calibration.keys) or 'nothing'}; +- is {found.widths:.3g} standard errors"
+    yield ""
+    if found.flows:
+        rows = [["", "Q", *(cell for name in _COLUMNS for cell in (NUMBERS[name].symbol, "+-"))]]
+        for i, one in enumerate(found.flows, 1):
+            cells = [tables.number(one.flow.mass_flux)]
+            for name in _COLUMNS:
+                value, error = one.numbers[name]
+                cells += [tables.number(value), f"{found.widths * error:.2g}"]
+            rows.append([str(i), *cells])
+        yield tables.table(rows)
+    else:
+        yield f"no flow: {found.flow_set.reason}"
+    yield ""
+    for fold in found.folds:
+        yield f"{fold.kind}: {fold.turns} = {tables.number(fold.value)} +- {fold.value * found.widths * fold.error:.2g}"
+    yield from found.warnings

@@ -1,0 +1,1 @@
+"""From measurements to parameters: calibration with uncertainties, comparison of laws, prediction with bands."""

@@ -1,0 +1,283 @@
+"""Fits and predictions as JSON objects, and fits in files from which predictions are made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chuteflow.errors import InputError
+from chuteflow.fitting.calibration import Calibration
+from chuteflow.io import contract, records
+from chuteflow.io.records import FORMAT
+from chuteflow.io.writing import require_suffix, require_writable, write_whole
+from chuteflow.steady.free import free_parameter
+from chuteflow.steady.quantities import FIELDS, NUMBERS
+
+if TYPE_CHECKING:
+    from chuteflow.fitting.calibration import Fit, Fitted
+    from chuteflow.fitting.design import Design
+    from chuteflow.fitting.direct import DirectMeasurement
+    from chuteflow.fitting.prediction import Prediction
+
+#: Endings of the files, the name of their kind, and bytes in one at most.
+SAVED = (".nc", ".json")
+KIND = "fit"
+_LARGEST = 100_000_000
+
+
+def fit_object(found: Fit) -> dict[str, Any]:
+    """What ``chuteflow fit --json`` prints of one law."""
+    return {
+        "chute": contract.chute_object(found.chute),
+        "closure": contract.closure_object(found.chute),
+        "estimates": {
+            one.key: {
+                "value": one.value,
+                "error": contract.finite(one.error),
+                "interval": [one.interval.low, one.interval.high],
+                "ends": list(one.interval.ends),
+                "determined": one.determined,
+            }
+            for one in found.estimates
+        },
+        "covariance": _rows(found.covariance),
+        "correlation": _rows(found.correlation),
+        "chi2": found.chi2,
+        "values": found.count,
+        "unknowns": found.unknowns,
+        "freedom": found.freedom,
+        "probability": found.probability,
+        "aicc": contract.finite(found.aicc),
+        "errors_known": found.measured.errors_known,
+        "error_scale": found.error_scale,
+        "loss": found.loss,
+        "confidence": found.confidence,
+        "converged": found.converged,
+        "warnings": found.warnings,
+        "experiments": [_experiment(one) for one in found.experiments],
+        "direct": [_direct(one) for one in found.direct],
+        "alternatives": [
+            {
+                "values": dict(zip((p.key for p in found.free), one.values.tolist(), strict=True)),
+                "chi2": one.chi2,
+                "fits_as_well": one.fits_as_well,
+                "same_flow": one.same_flow,
+                "flows": [contract.flow_object(flow) for flow in one.flows],
+            }
+            for one in found.alternatives
+        ],
+    }
+
+
+def comparison_object(found: Sequence[Fit], reasons: Sequence[str]) -> dict[str, Any]:
+    """What ``chuteflow fit --json`` prints: fits of one or several laws, the best first; ``reasons`` why there is none
+    for others."""
+    return {"fits": [fit_object(one) for one in found], "failed": list(reasons)}
+
+
+def prediction_object(found: Prediction) -> dict[str, Any]:
+    """What ``chuteflow predict --json`` prints: values with standard errors, null where one is infinite."""
+    return {
+        "chute": contract.chute_object(found.calibration.chute),
+        "parameters": list(found.calibration.keys),
+        "confidence": found.confidence,
+        "reason": found.flow_set.reason,
+        "flows": [
+            {
+                "flow": contract.flow_object(one.flow),
+                "errors": {NUMBERS[n].symbol: contract.finite(error) for n, (_, error) in one.numbers.items()},
+                "profiles": {
+                    "z": one.height.tolist(),
+                    **{
+                        name: {"value": _numbers(pair[0]), "error": _numbers(pair[1])}
+                        for name, pair in one.profiles.items()
+                    },
+                },
+            }
+            for one in found.flows
+        ],
+        "curve": [
+            {
+                "Q": np.exp(band.points[:, 0]).tolist(),
+                "h": np.exp(band.points[:, 1]).tolist(),
+                "normal": band.normals.tolist(),
+                "error": _numbers(band.errors),
+            }
+            for band in found.bands
+        ],
+        "folds": [
+            {"kind": one.kind, "value": one.value, "relative_error": contract.finite(one.error)} for one in found.folds
+        ],
+        "warnings": found.warnings,
+    }
+
+
+def design_object(found: Design) -> dict[str, Any]:
+    """What ``chuteflow design --json`` prints."""
+    return {
+        "wanted": dict(found.wanted),
+        "solutions": [
+            {
+                "values": dict(zip((p.key for p in found.unknown), one.values.tolist(), strict=True)),
+                "chute": contract.chute_object(one.flow.chute),
+                "flow": contract.flow_object(one.flow),
+            }
+            for one in found.solutions
+        ],
+        "starts": found.starts,
+        "reason": found.reason,
+    }
+
+
+def prediction_rows(found: Prediction) -> Iterator[list[str]]:
+    """The profiles with their errors as rows of CSV."""
+    names = [name for name in FIELDS if name != "height"]
+    cells = [cell for name in names for cell in (FIELDS[name].symbol, f"{FIELDS[name].symbol}_error")]
+    yield ["flow", "z", *cells]
+    for i, one in enumerate(found.flows, 1):
+        columns = [values for name in names for values in one.profiles[name]]
+        for z, *row in zip(one.height, *columns, strict=True):
+            yield [str(i), repr(float(z)), *("" if not np.isfinite(v) else repr(float(v)) for v in row)]
+
+
+def _numbers(values: Any) -> list[float | None]:
+    return [contract.finite(value) for value in values]
+
+
+def _experiment(one: Fitted) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "chute": contract.chute_object(one.flow.chute),
+        "flow": contract.flow_object(one.flow),
+        "rank": one.rank,
+        "flows": one.flows,
+        "base": one.base,
+        "base_error": one.base_error,
+        "residuals": {
+            series.symbol: {"z": series.height.tolist(), "residual": residual.tolist()}
+            for series, residual in one.profiles
+        },
+        "scalar_residuals": one.residuals[sum(len(r) for _, r in one.profiles) :].tolist(),
+    }
+
+
+def _direct(one: DirectMeasurement) -> dict[str, Any]:
+    parts = {"g1": one.g1, "g2": one.g2, "slip_ratio": one.slip}
+    return {
+        "name": one.name,
+        "z": one.height.tolist(),
+        "nu": one.nu.tolist(),
+        **{
+            name: None
+            if part is None
+            else {"value": _numbers(part.value), "error": _numbers(part.error), "law": _numbers(part.law)}
+            for name, part in parts.items()
+        },
+    }
+
+
+def _rows(matrix: Any) -> list[list[float | None]]:
+    return [[contract.finite(value) for value in row] for row in matrix]
+
+
+def save_fit(found: Fit, path: str | os.PathLike[str]) -> None:
+    """Write a fit to ``path``: .nc (NetCDF 4) with its estimates and residuals, or .json; predictions are made from
+    either.
+
+    Raises:
+        InputError: for another ending, or a file that cannot be written.
+    """
+    kept: dict[str, Any] = {"format": FORMAT, "kind": KIND, "fit": fit_object(found)}
+    if require_writable(path, SAVED) == ".json":
+        write_whole(path, contract.text(kept) + "\n")
+        return
+    from chuteflow.io import netcdf_file
+
+    stream = BytesIO()
+    with netcdf_file.create(stream) as file:
+        _write(file, found, contract.text(kept).encode())
+    write_whole(path, stream.getvalue())
+
+
+def load_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """What predictions are made from, of the fit that :func:`save_fit` wrote to ``path``.
+
+    Raises:
+        InputError: for a file that is missing, damaged, of another kind or of a later version.
+    """
+    suffix = require_suffix(path, SAVED)
+    try:
+        content = Path(path).read_bytes() if suffix == ".json" else _content(Path(path))
+        kept = contract.parsed(content)
+        records.require_format(kept)
+        if kept["kind"] != KIND:
+            raise InputError("it holds no fit")
+        return _calibration(kept["fit"])
+    except InputError as error:
+        raise InputError(f"cannot load {path}: {error}") from None
+    except OSError as error:
+        raise InputError(f"cannot load {path}: {error.strerror or 'it is not a file of this format'}") from None
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError):
+        raise InputError(f"cannot load {path}: it is damaged, or holds no fit of chuteflow") from None
+
+
+def _calibration(kept: Mapping[str, Any]) -> Calibration:
+    chute = records.chute_from(kept)
+    keys = tuple(free_parameter(chute, key).key for key in kept["estimates"]) if chute.law.known else ()
+    covariance = np.array([records.numbers("the covariance", row) for row in kept["covariance"]])
+    if covariance.shape != (len(kept["estimates"]), len(kept["estimates"])):
+        raise InputError("its covariance does not fit its parameters")
+    left = tuple(key for key, one in kept["estimates"].items() if not one["determined"])
+    return Calibration(chute, keys, covariance.reshape(len(keys), len(keys)), left)
+
+
+def _content(path: Path) -> bytes:
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        stored: Any = file["fit"]
+        if stored.size > _LARGEST:
+            raise InputError(f"it claims {stored.size} bytes")
+        return bytes(stored[...].tobytes())
+
+
+def _write(file: Any, found: Fit, content: bytes) -> None:
+    from chuteflow import __version__
+
+    k = len(found.free)
+    file.dimensions = {"parameter": k, "parameter_2": k, "end": 2, "byte": len(content)}
+    names = " ".join(p.key for p in found.free)
+    file.attrs.update(
+        {
+            "Conventions": "CF-1.11",
+            "title": "Parameters of a chute from measurements",
+            "source": f"chuteflow {__version__}",
+            "parameters": names,
+            "chi2": found.chi2,
+            "values": found.count,
+            "unknowns": found.unknowns,
+            **found.chute.as_dict(),
+        }
+    )
+
+    def put(name: str, dimensions: tuple[str, ...], values: Any, said: str) -> None:
+        variable = file.create_variable(name, dimensions, values.dtype, data=values)
+        variable.attrs.update({"long_name": said, "units": "1"})
+
+    ends = np.array([[one.interval.low, one.interval.high] for one in found.estimates], dtype=float).reshape(k, 2)
+    put("estimate", ("parameter",), found.values.astype(float), f"estimates of {names}")
+    put("interval", ("parameter", "end"), ends, f"intervals of confidence {found.confidence:g}")
+    put("covariance", ("parameter", "parameter_2"), found.covariance, "covariance of the estimates")
+    for i, one in enumerate(found.experiments, 1):
+        for series, residual in one.profiles:
+            name = f"experiment_{i}_{series.symbol}"
+            file.dimensions[name] = len(residual)
+            put(f"{name}_height", (name,), series.height, f"heights of {series.symbol} in experiment {one.name}")
+            put(f"{name}_value", (name,), series.value, f"measured {series.symbol} in experiment {one.name}")
+            put(f"{name}_residual", (name,), residual, "computed less measured, in standard errors")
+    put("fit", ("byte",), np.frombuffer(content, dtype="u1"), "everything, as a JSON text")
