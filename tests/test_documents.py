@@ -24,7 +24,16 @@ def name(page):
     return str(page.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("page", [p for p in (*PAGES, *NOTEBOOKS) if any(blocks_of(p))], ids=name)
+#: Pages whose examples take seconds.
+LONG = {"docs/calibration.md", "docs/tutorial.ipynb", "docs/domains.md", "docs/stability-answers.md"}
+EXAMPLES = [
+    pytest.param(page, id=name(page), marks=pytest.mark.slow if name(page) in LONG else ())
+    for page in (*PAGES, *NOTEBOOKS)
+    if any(blocks_of(page))
+]
+
+
+@pytest.mark.parametrize("page", EXAMPLES)
 def test_examples(page, tmp_path):
     for file in page.parent.glob("*.py"):  # what the page tells to save
         if page.is_relative_to(DOCS) and file.parent != DOCS:
