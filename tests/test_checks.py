@@ -3,6 +3,7 @@
 import re
 from decimal import Decimal
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,17 +37,20 @@ NO_NUMBERS = {
 NUMBERS = [0.5, np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2), Decimal("0.5"), np.longdouble(0.5)]
 
 
+def listed(value: Any) -> Any:
+    """A list in another one: that of one number is a list of conditions, which flows() takes."""
+    return [value] if isinstance(value, list | np.ndarray) else value
+
+
 @pytest.mark.parametrize("value", NO_NUMBERS.values(), ids=NO_NUMBERS)
 def test_what_is_no_number_is_refused_in_one_line(value):
-    # One number in a list is a list of conditions, which flows() takes.
-    several = [value] if isinstance(value, (list, np.ndarray)) else value
     asked = [
         lambda: Chute(value, 0.8, 0.8, 0.6),
         lambda: Chute(0.3, 0.8, value, 0.6),
         lambda: Chute.at_angle(value, restitution=0.8, wall_restitution=0.8, roughness=0.6),
         lambda: Scales(value, 2500.0),
         lambda: Scales(1e-3, 2500.0, gravity=value),
-        lambda: whole("points", value, 0) if value is None else flows(PAPER, M=several),
+        lambda: whole("points", value, 0) if value is None else flows(PAPER, M=listed(value)),
         lambda: flows(PAPER, Q=3.0, tolerance=value),
         lambda: flows(PAPER, Q=3.0, largest_holdup=value),
         lambda: flows(PAPER, Q=3.0, surface_temperature=(value, 1e3)),
