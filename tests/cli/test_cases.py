@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 
 import click
 import pytest
@@ -239,6 +240,16 @@ def test_the_nearest_with_a_flow_has_one(run):
     near = json.loads(out)["nearest_with_flow"]
     assert near["slope"] == found.parameters["slope"]
     assert near["examined"]["slope"][0] < 0.2 < near["slope"] < near["examined"]["slope"][1]
+
+
+def test_what_is_nearest_is_told_soon_where_flows_multiply_with_depth():
+    began = time.process_time()
+    found = nearest(chuteflow.Chute(0.373, 0.8, 0.8, 0.55), Q=100.0)
+    # It took eighteen seconds where every value was searched to the largest hold-up that the answer had needed.
+    assert time.process_time() - began < 3.0
+    slope = found.parameters["slope"]
+    assert slope is not None
+    assert len(chuteflow.flows(chuteflow.Chute(slope, 0.8, 0.8, 0.55), Q=100.0)) > 0
 
 
 def test_the_nearest_flux_has_a_flow():

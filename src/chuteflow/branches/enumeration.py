@@ -99,32 +99,22 @@ def flows(
     """
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
-    search = tolerance, surface_temperature, largest_holdup
+    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
     if not named or np.ndim(named[0][1]) == 0:
-        return flows_within(chute, *asked(given), *search)
+        return flows_within(chute, *asked(given), tolerance, within)
     name, several = named[0]
     values = real_array(name, several)
     if values.ndim > 1:
         raise InputError(f"{name}: must be a number or a one-dimensional array of some")
     each = [{**given, name: value} for value in values.tolist()]
-    sets = tuple(flows_within(chute, *asked(one), *search) for one in each)
+    sets = tuple(flows_within(chute, *asked(one), tolerance, within) for one in each)
     return FlowSets(chute, name, tuple(values.tolist()), sets)
 
 
 @on_one_thread
 @np.errstate(under="ignore")
-def flows_within(
-    chute: Chute,
-    which: int,
-    value: float,
-    tolerance: float,
-    surface_temperature: tuple[float, float],
-    largest_holdup: float,
-    largest_flux: float = np.inf,
-) -> FlowSet:
-    """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`; those with a mass flux above
-    ``largest_flux`` need not be among them."""
-    within = replace(Range.checked(surface_temperature, largest_holdup, chute.surface), largest_flux=largest_flux)
+def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: Range) -> FlowSet:
+    """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
         # Well inside, so that a turn near the value is seen from both sides.

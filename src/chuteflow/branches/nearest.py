@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chuteflow import display
-from chuteflow.branches.enumeration import asked, flows
-from chuteflow.branches.families import families
+from chuteflow.branches.enumeration import asked, flows_within
+from chuteflow.branches.families import families, search
 from chuteflow.branches.ranges import Range
 from chuteflow.errors import ChuteflowError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE, Parameter
 from chuteflow.steady.chute import Chute
+from chuteflow.steady.collocation import LOG_Q
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import TOLERANCE
 from chuteflow.threads import on_one_thread
@@ -30,6 +31,9 @@ _FACTOR, _SLOPES = 1.03, 32
 _VALUES = 24
 #: Bisections of the edge between a value without and one with flows.
 _BISECTIONS = 6
+#: Cells of the grids of trajectories at which the values of one parameter are left: half a second or so. Where flows
+#: multiply with depth a grid has a hundred times as many as elsewhere.
+_CELLS = 500_000
 
 
 @dataclass(frozen=True)
@@ -37,9 +41,9 @@ class Nearest:
     """The nearest that has a flow where ``chute`` has none.
 
     ``parameters`` has a value by the name of each parameter of the chute, the others as they are, or None where none of
-    those examined has a flow; ``examined`` is the smallest and the largest of these. ``quantity`` is the name of the
-    condition ("Q", "M", "h" or "T_surface"), or None, and ``value`` the nearest value of it that a flow of the chute
-    itself was solved at, or None.
+    those examined has a flow; ``examined`` is the smallest and the largest of these, which end early where searches
+    take long. ``quantity`` is the name of the condition ("Q", "M", "h" or "T_surface"), or None, and ``value`` the
+    nearest value of it that a flow of the chute itself was solved at, or None.
     """
 
     chute: Chute
@@ -84,64 +88,70 @@ def nearest(
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     condition = {name: value for name, value in given.items() if value is not None}
     within = Range.checked(surface_temperature, largest_holdup, chute.surface)
-    looked_for = _LookedFor(condition, within)
+    looked_for = _LookedFor(within)
+    quantity = near = None
     if condition:
+        (quantity,) = condition
         which, value = asked(given)
-        looked_for = replace(looked_for, which=which, value=value)
+        looked_for = _LookedFor(within.restricted(which, value), which, value)
+        near = _nearest_value(chute, which, value, within)
     found: dict[str, float | None] = {}
     examined: dict[str, tuple[float, float]] = {}
-    for parameter in PARAMETERS.values():
-        places = _places(parameter, getattr(chute, parameter.name))
-        found[parameter.name] = _first(chute, parameter, places, looked_for)
-        examined[parameter.name] = (min(places), max(places))
-    quantity = next(iter(condition), None)
-    return Nearest(chute, found, examined, quantity, looked_for.nearest_value(chute) if quantity else None)
+    for name, parameter in PARAMETERS.items():
+        found[name], examined[name] = _first(chute, parameter, looked_for)
+    return Nearest(chute, found, examined, quantity, near)
 
 
 @dataclass(frozen=True)
 class _LookedFor:
-    """A flow under a ``condition``, or any, in a range."""
+    """A flow in a range at which the quantity ``which`` has a ``value``, or any where that is None."""
 
-    condition: Mapping[str, float]
     within: Range
-    which: int = 0
-    value: float = 0.0
+    which: int = LOG_Q
+    value: float | None = None
 
     def on(self, chute: Chute) -> bool:
         """Whether rough flows of ``chute`` meet it."""
         branches = self._rough(chute)
-        if not self.condition:
+        if self.value is None:
             return bool(branches)
         target = math.log(self.value)
         return any(m[:, self.which].min() <= target <= m[:, self.which].max() for m in branches)
 
     def surely_on(self, chute: Chute) -> bool:
         """Whether a flow of ``chute`` is solved that meets it."""
-        if not self.condition:
+        if self.value is None:
             return any(family.solved(0, TOLERANCE) for family in families(model(chute), self.within))
-        search = (self.within.coldest, self.within.hottest)
-        return len(flows(chute, **self.condition, surface_temperature=search, largest_holdup=self.within.deepest)) > 0
+        return len(flows_within(chute, self.which, self.value, TOLERANCE, self.within)) > 0
 
-    def nearest_value(self, chute: Chute) -> float | None:
-        """The nearest value of the condition at which a flow of the chute itself is solved."""
-        target = math.log(self.value)
-        ends = [
-            (abs(float(m[i, self.which]) - target), family, int(i))
-            for family in families(model(chute), self.within)
-            for m in (family.macroscopic,)
-            for i in (np.abs(m[:, self.which] - target).argmin(),)
-        ]
-        for _, family, i in sorted(ends, key=lambda end: end[0]):
-            point = family.solved(i, TOLERANCE)
-            if point is not None:
-                return float(np.exp(point.m[self.which]))
-        return None
+    def cells(self, chute: Chute) -> int:
+        """How many cells the search of ``chute`` looked at."""
+        try:
+            return search(model(chute), self.within).cells
+        except ChuteflowError:
+            return 0
 
     def _rough(self, chute: Chute) -> list[Array]:
         try:
             return [family.macroscopic for family in families(model(chute), self.within)]
         except ChuteflowError:
             return []  # a chute whose law has no meaning there, or that cannot be searched
+
+
+def _nearest_value(chute: Chute, which: int, value: float, within: Range) -> float | None:
+    """The value nearest to ``value`` of the quantity ``which`` at which a flow of the chute itself is solved."""
+    target = math.log(value)
+    ends = [
+        (abs(float(m[i, which]) - target), family, int(i))
+        for family in families(model(chute), within)
+        for m in (family.macroscopic,)
+        for i in (np.abs(m[:, which] - target).argmin(),)
+    ]
+    for _, family, i in sorted(ends, key=lambda end: end[0]):
+        point = family.solved(i, TOLERANCE)
+        if point is not None:
+            return float(np.exp(point.m[which]))
+    return None
 
 
 def _places(parameter: Parameter, start: float) -> list[float]:
@@ -155,13 +165,20 @@ def _places(parameter: Parameter, start: float) -> list[float]:
     return sorted((p for p in places if p != start), key=lambda p: abs(p - start))
 
 
-def _first(chute: Chute, parameter: Parameter, places: list[float], looked_for: _LookedFor) -> float | None:
-    """The nearest of ``places`` that has a flow, moved towards the chute as far as it has one."""
-    for place in places:
+def _first(chute: Chute, parameter: Parameter, looked_for: _LookedFor) -> tuple[float | None, tuple[float, float]]:
+    """The nearest value of a parameter that has a flow, moved towards the chute as far as it has one, and the smallest
+    and largest value examined."""
+    examined = [getattr(chute, parameter.name)]
+    cells = 0
+    for place in _places(parameter, examined[0]):
+        examined.append(place)
         for value in _towards(chute, parameter, place, looked_for):
             if looked_for.surely_on(replace(chute, **{parameter.name: value})):
-                return value
-    return None
+                return value, (min(examined), max(examined))
+        cells += looked_for.cells(replace(chute, **{parameter.name: place}))
+        if cells > _CELLS:
+            break
+    return None, (min(examined), max(examined))
 
 
 def _towards(chute: Chute, parameter: Parameter, place: float, looked_for: _LookedFor) -> Iterator[float]:

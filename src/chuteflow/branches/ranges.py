@@ -11,10 +11,12 @@ from chuteflow.checks import number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, SHALLOWEST, WIDEST
-from chuteflow.steady.collocation import LOG_M, LOG_T
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
+#: How far a search goes beyond a hold-up and a flux asked for, so that turns near them are seen from both sides.
+_DEEPER, _FURTHER = 1.5, 3.0
 
 
 class BranchEnd(StrEnum):
@@ -80,6 +82,13 @@ class Range:
             coldest=max(min(self.coldest, value), WIDEST[0]),
             hottest=min(max(self.hottest, value), WIDEST[1]),
         )
+
+    def restricted(self, which: int, value: float) -> Range:
+        """The part of the range in which all flows lie at which the quantity ``which`` has a ``value``: no deeper than
+        a given hold-up, and with trajectories no further than to a given flux, but for a margin."""
+        if which == LOG_M:
+            return replace(self, deepest=min(self.deepest, _DEEPER * value))
+        return replace(self, largest_flux=_FURTHER * value) if which == LOG_Q else self
 
     def contains(self, macroscopic: Array, margin: float = _ROUNDING) -> bool:
         """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, give or take ``margin``."""

@@ -17,7 +17,7 @@ from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEM
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.branches.results import Curve, FlowSet, Searched
+    from chuteflow.branches.results import Curve, FlowSet
     from chuteflow.steady.cases import Case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
@@ -548,18 +548,14 @@ def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None 
 
 
 def nearest(
-    chute: Chute, condition: Mapping[str, float], searched: Searched, scales: Scales | None
+    given: Mapping[str, Any], chute: Chute, condition: Mapping[str, float], scales: Scales | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """The nearest that has a flow where ``chute`` has none: what JSON has of it, and lines."""
+    """The nearest that has a flow in the range asked for where ``chute`` has none: what JSON has of it, and lines."""
     from chuteflow.branches.nearest import nearest as look
     from chuteflow.io import contract, words
 
-    found = look(
-        chute,
-        **condition,
-        surface_temperature=searched.surface_temperature,
-        largest_holdup=searched.largest_holdup,
-    )
+    within = {name: value for name, value in search(given, chute.slope, scales).items() if name != "tolerance"}
+    found = look(chute, **condition, **within)
     return {"nearest_with_flow": contract.nearest_object(found, scales)}, list(words.nearest(found, scales))
 
 
@@ -573,7 +569,7 @@ def deliver_without_flow(
     """Print that there is no flow, and what is nearest; the object is ``empty`` with the chute and the reason."""
     from chuteflow.io import contract, words
 
-    near, lines = nearest(found.chute, condition, found.searched, scales)
+    near, lines = nearest(given, found.chute, condition, scales)
     content = {"chute": contract.chute_object(found.chute), **empty, "reason": found.reason, **near}
     text = [words.in_own_units(f"no flow: {found.reason}", scales), *lines]
     click.echo(contract.text(content) if given["as_json"] else "\n".join(text))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.enumeration import flows_within
+from chuteflow.branches.ranges import Range
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
@@ -29,8 +30,6 @@ from chuteflow.theory.constitutive import Law, require_positive
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 #: Down to this hold-up columns are taken to lose no flows; the least at which they lost some is 4.79.
 _SHALLOW = 3.0
-#: Trajectories are followed to where their flux by shear is so many times that asked for.
-_FURTHER = 3.0
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
 _RESTITUTIONS = 257
 #: What a calculation may end with that is no reason to stop the others.
@@ -270,17 +269,16 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     slope, e, ew, roughness = (float(p[name][point]) for name in BY_KEY)
     surface, closure = SURFACES[int(p["surface"][point])], study.laws[int(p["closure"][point])]
     base = study.bases[int(p["base"][point]) if "base" in p else 0]
-    value = float(p[study.condition][point])
+    which, value = _WHICH[study.condition], float(p[study.condition][point])
+    # Of this chute nothing else is asked.
+    within = Range.checked(study.surface_temperature, study.largest_holdup, surface).restricted(which, value)
     try:
         found = flows_within(
             Chute(slope, e, ew, roughness, surface, closure, base),
-            _WHICH[study.condition],
+            which,
             value,
             study.tolerance,
-            study.surface_temperature,
-            # Of this chute nothing else is asked.
-            min(study.largest_holdup, value) if study.condition == "M" else study.largest_holdup,
-            largest_flux=_FURTHER * value if study.condition == "Q" else np.inf,
+            within,
         )
     except _FAILURES as error:
         out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER

@@ -40,7 +40,7 @@ def command(**given: Any) -> None:
 
     points = {} if given["points"] is None else {"points": given["points"]}
     found = curve(chute, **points, **options.search(given, chute.slope, scales))
-    near, lines = ({}, []) if found.branches else options.nearest(chute, {}, found.searched, scales)
+    near, lines = ({}, []) if found.branches else options.nearest(given, chute, {}, scales)
     judged = _judged(found, given["samples"]) if given["stability"] else None
     if judged is not None:
         found = judged.curve

@@ -52,7 +52,7 @@ def command(**given: Any) -> None:
     from chuteflow.branches.enumeration import flows
 
     found = flows(chute, **condition, **options.search(given, chute.slope, scales))
-    near, lines = ({}, []) if len(found) else options.nearest(chute, condition, found.searched, scales)
+    near, lines = ({}, []) if len(found) else options.nearest(given, chute, condition, scales)
     if given["as_json"]:
         from chuteflow.io import contract
 

@@ -78,7 +78,7 @@ def command(as_json: bool, **given: Any) -> None:
 
     check_wavenumbers(*(0.0 if k is None else k for k in (kx, ky)))
     found = flows(chute, **condition, **search)
-    near, lines = ({}, []) if len(found) else options.nearest(chute, condition, found.searched, scales)
+    near, lines = ({}, []) if len(found) else options.nearest(given, chute, condition, scales)
     answers = [_answer(flow, kx, ky, count) for flow in found]
     if as_json:
         from chuteflow.io import contract, stability_records
