@@ -16,6 +16,11 @@ from chuteflow.stability.modes import Disturbances
 CHUTE = chuteflow.Chute(slope=0.3, restitution=0.8, wall_restitution=0.8, roughness=0.6)
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with the pages of the built documentation, the longest test, so that no worker waits for it at the end."""
+    items.sort(key=lambda item: item.path.name != "test_docs_browser.py")
+
+
 @pytest.fixture(scope="session")
 def three():
     """The flows A, B and C of the paper."""

@@ -8,6 +8,8 @@ from chuteflow.dem.scene import Scene
 from chuteflow.steady.chute import Chute
 
 CHUTE = Chute(slope=0.18, restitution=0.95, wall_restitution=0.95, roughness=0.6)
+#: The same as options.
+CHUTE_WORDS = ["--slope", "0.18", "--e", "0.95", "--ew", "0.95", "--roughness", "0.6"]
 
 
 @pytest.fixture(scope="session")

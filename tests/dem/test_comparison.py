@@ -19,6 +19,8 @@ from chuteflow.errors import InputError
 from chuteflow.plotting.comparison_plot import plot_comparison
 from chuteflow.steady.chute import Chute
 
+from .conftest import CHUTE_WORDS
+
 CHUTE = Chute(0.18, 0.95, 0.95, 0.63)
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -288,21 +290,7 @@ def test_without_lammps_one_line_says_how_to_install_it(monkeypatch, capsys, tmp
 
 
 def test_the_input_is_written_to_be_run_elsewhere(capsys, tmp_path):
-    words = [
-        "--slope",
-        "0.18",
-        "--e",
-        "0.95",
-        "--ew",
-        "0.95",
-        "--roughness",
-        "0.6",
-        "--holdup",
-        "1.264",
-        "--box",
-        "6x6",
-        "--write-only",
-    ]
+    words = [*CHUTE_WORDS, *["--holdup", "1.264", "--box", "6x6", "--write-only"]]
     assert main(["dem", "run", *words, "--out", str(tmp_path / "run")]) == 0
     assert "lmp -in start.in" in capsys.readouterr().out
     settings = (tmp_path / "run" / "settings.in").read_text()

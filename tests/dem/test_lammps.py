@@ -20,6 +20,8 @@ from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import Schedule, contact_lines
 from chuteflow.steady.chute import Chute
 
+from .conftest import CHUTE_WORDS
+
 HEAD = """units lj
 atom_style sphere
 atom_modify map array
@@ -167,24 +169,7 @@ def test_forces_are_those_of_lammps(lammps, tmp_path, friction):
     np.testing.assert_allclose(ours[:60], theirs, rtol=1e-6, atol=1e-5 * np.abs(theirs).max())
 
 
-WORDS = [
-    "--slope",
-    "0.18",
-    "--e",
-    "0.95",
-    "--ew",
-    "0.95",
-    "--roughness",
-    "0.6",
-    "--holdup",
-    "0.6",
-    "--box",
-    "6x6",
-    "--restitution-error",
-    "0.01",
-    "--block",
-    "1",
-]
+WORDS = [*CHUTE_WORDS, *["--holdup", "0.6", "--box", "6x6", "--restitution-error", "0.01", "--block", "1"]]
 
 
 def test_a_chute_is_simulated_from_its_options_to_the_comparison(lammps, tmp_path, capsys):

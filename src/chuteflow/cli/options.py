@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from chuteflow.errors import InputError
-from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE
+from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE, Parameter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -242,37 +242,35 @@ _model_options = _options(
         "--base", metavar="NAME", help="Base: richman (the default), or johnson-jackson:specularity=0.5 and the like."
     ),
 )
+
+
+def _parameter_options(
+    kind: click.ParamType, slope: str, angle: str, said: Callable[[Parameter], str]
+) -> Callable[[Command], Command]:
+    """Options of the parameters, numbers of a ``kind``; ``said`` is what the help says after their descriptions."""
+    return _options(
+        option("--slope", type=kind, help=f"Slope tan(theta) of the chute; {slope}."),
+        option("--angle", type=Number(), help=f"Inclination theta in degrees{angle}."),
+        *(
+            option(*_names(key), type=kind, help=f"{_opening(parameter.description)}{said(parameter)}.")
+            for key, parameter in BY_KEY.items()
+            if key != "slope"
+        ),
+    )
+
+
+#: The parameters of a chute alone.
+parameter_options = _parameter_options(Number(), "or give --angle", "", lambda parameter: f", {parameter.allowed}")
 #: All that says which chute, with or without SI units.
-chute_options = _options(
-    _described,
-    case_options,
-    option("--slope", type=Number(), help="Slope tan(theta) of the chute; or give --angle."),
-    option("--angle", type=Number(), help="Inclination theta in degrees."),
-    *(
-        option(*_names(key), type=Number(), help=f"{_opening(parameter.description)}, {parameter.allowed}.")
-        for key, parameter in BY_KEY.items()
-        if key != "slope"
-    ),
-    _model_options,
-    scale_options,
-)
+chute_options = _options(_described, case_options, parameter_options, _model_options, scale_options)
 
 
 def range_options(slope: str) -> Callable[[Command], Command]:
     """The same where some parameters take a range; ``slope`` says which."""
-    return _options(
-        _described,
-        case_options,
-        option("--slope", type=NumberOrInterval(), help=f"Slope tan(theta) of the chute; LO:HI {slope}."),
-        option("--angle", type=Number(), help="Inclination theta in degrees, instead of --slope."),
-        *(
-            option(*_names(key), type=NumberOrInterval(), help=f"{_opening(parameter.description)}; or LO:HI.")
-            for key, parameter in BY_KEY.items()
-            if key != "slope"
-        ),
-        _model_options,
-        scale_options,
+    parameters = _parameter_options(
+        NumberOrInterval(), f"LO:HI {slope}", ", instead of --slope", lambda _: "; or LO:HI"
     )
+    return _options(_described, case_options, parameters, _model_options, scale_options)
 
 
 condition_options = _options(
@@ -598,11 +596,12 @@ def deliver_object(
 def deliver(
     given: Mapping[str, Any],
     answer: str,
-    save: Callable[[str], None],
+    save: Callable[[str], None] | None,
     plot: Callable[[], Figure],
     **pictures: Callable[[], Figure],
 ) -> None:
-    """Write the files that --save, --plot and options of ``pictures`` name, and print the answer.
+    """Write the files that --save, where the command has it, --plot and options of ``pictures`` name, and print the
+    answer.
 
     No full disk is to cost the answer.
 
@@ -620,7 +619,9 @@ def deliver(
                 write_figure(drawn, one)
 
     failures = []
-    writers = {"save": save} | {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
+    writers = {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
+    if save is not None:
+        writers = {"save": save, **writers}
     for name, write in writers.items():
         if given[name] is not None:
             try:
@@ -633,14 +634,15 @@ def deliver(
 
 
 def require_outputs(given: Mapping[str, Any], saved: Sequence[str] = SAVED) -> None:
-    """Check before anything is computed that --save, with an ending of ``saved``, and --plot can be written.
+    """Check before anything is computed that --save, with an ending of ``saved``, and --plot can be written, as far as
+    the command has them.
 
     Raises:
         InputError: for a file that cannot.
     """
     from chuteflow.io.writing import require_writable
 
-    if given["save"] is not None:
+    if given.get("save") is not None:
         require_writable(given["save"], saved)
     if given["plot"] is not None:
         for path in picture_files(given["plot"]):

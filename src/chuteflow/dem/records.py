@@ -65,19 +65,14 @@ def load(path: str | os.PathLike[str]) -> Measured:
     Raises:
         InputError: for a file that is missing, damaged or holds something else, naming what.
     """
+    from chuteflow.io.reading import loading
     from chuteflow.io.writing import require_suffix
 
     suffix = require_suffix(path, SAVED)
-    try:
+    with loading(path, "holds no measured flow"):
         if os.path.getsize(path) > _MOST_BYTES:
             raise InputError(f"it is larger than {_MOST_BYTES // 1_000_000} MB")
         return _from_netcdf(Path(path)) if suffix == ".nc" else _from_csv(Path(path))
-    except InputError as error:
-        raise InputError(f"cannot load {path}: {error}") from None
-    except OSError as error:
-        raise InputError(f"cannot load {path}: {error.strerror or 'it is not a file of this format'}") from None
-    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError):
-        raise InputError(f"cannot load {path}: it is damaged, or holds no measured flow") from None
 
 
 def _netcdf(measured: Measured) -> bytes:

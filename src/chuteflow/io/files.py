@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from chuteflow.errors import InputError
 from chuteflow.io import contract
+from chuteflow.io.reading import loading
 from chuteflow.io.records import KIND_OF, Result
 from chuteflow.io.writing import require_suffix, require_writable, write_whole
 from chuteflow.steady.quantities import Scales
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 #: The module of each format, imported when it is needed; each has write(result, stream, scales) and read(path).
 FORMATS = {".nc": "netcdf_file", ".csv": "csv_file", ".json": "json_file"}
-#: What reading a damaged file may raise.
-_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError)
 
 
 def save(result: Result | Domain, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
@@ -82,13 +81,6 @@ def load(path: str | os.PathLike[str]) -> Result | Domain:
     from chuteflow.io import domain_records
 
     reader = import_module(f"chuteflow.io.{FORMATS[require_suffix(path, tuple(FORMATS))]}")
-    try:
+    with loading(path, "was not written by chuteflow"):
         found = domain_records.read(Path(path))
         return reader.read(Path(path)) if found is None else found
-    except InputError as error:
-        raise InputError(f"cannot load {path}: {error}") from None
-    except OSError as error:
-        what = error.strerror or "it is not a file of this format"
-        raise InputError(f"cannot load {path}: {what}") from None
-    except _DAMAGE:
-        raise InputError(f"cannot load {path}: it is damaged, or was not written by chuteflow") from None

@@ -13,6 +13,7 @@ import numpy as np
 from chuteflow.errors import InputError
 from chuteflow.fitting.calibration import Calibration
 from chuteflow.io import contract, records
+from chuteflow.io.reading import loading
 from chuteflow.io.records import FORMAT
 from chuteflow.io.writing import require_suffix, require_writable, write_whole
 from chuteflow.steady.free import free_parameter
@@ -211,19 +212,13 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
         InputError: for a file that is missing, damaged, of another kind or of a later version.
     """
     suffix = require_suffix(path, SAVED)
-    try:
+    with loading(path, "holds no fit of chuteflow"):
         content = Path(path).read_bytes() if suffix == ".json" else _content(Path(path))
         kept = contract.parsed(content)
         records.require_format(kept)
         if kept["kind"] != KIND:
             raise InputError("it holds no fit")
         return _calibration(kept["fit"])
-    except InputError as error:
-        raise InputError(f"cannot load {path}: {error}") from None
-    except OSError as error:
-        raise InputError(f"cannot load {path}: {error.strerror or 'it is not a file of this format'}") from None
-    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError):
-        raise InputError(f"cannot load {path}: it is damaged, or holds no fit of chuteflow") from None
 
 
 def _calibration(kept: Mapping[str, Any]) -> Calibration:

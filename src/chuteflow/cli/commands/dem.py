@@ -53,11 +53,7 @@ def command() -> None:
 
 
 @command.command("run", epilog=_EPILOG)
-@options.option("--slope", type=options.Number(), help="Slope tan(theta) of the chute; or give --angle.")
-@options.option("--angle", type=options.Number(), help="Inclination theta in degrees.")
-@options.option("--e", type=options.Number(), help="Restitution of two grains.")
-@options.option("--ew", type=options.Number(), help="Restitution of a grain and the base.")
-@options.option("--roughness", type=options.Number(), help="Roughness r of the base, half the distance of its bumps.")
+@options.parameter_options
 @options.option("--holdup", type=options.Number(), help="Mass hold-up M.")
 @options.option("--box", type=Box(), help="Length and width of the periodic box, as 12x12, the default.")
 @options.option("--base", metavar="NAME", help="Bumps of the base: triangular (the default) or random.")
@@ -162,7 +158,7 @@ def study_command(**given: Any) -> None:
 @options.quiet_option
 def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> None:
     """Compare all measured flows in the files of FOLDER with the theory at the same hold-up."""
-    options.require_outputs({"save": None, **given})
+    options.require_outputs(given)
     from chuteflow.dem.results import CLOSURES, read_folder, table
     from chuteflow.io import tables
     from chuteflow.plotting.results_plot import plot_results
@@ -174,7 +170,7 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
             found.append(one)
             progress.tell(f"{len(found)} flows compared")
     text = tables.table(table(found, names), words=(0, 5))
-    options.deliver({"save": None, **given}, text, lambda _: None, lambda: plot_results(found))
+    options.deliver(given, text, None, lambda: plot_results(found))
 
 
 def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:

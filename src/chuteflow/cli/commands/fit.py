@@ -66,7 +66,7 @@ class Range(click.ParamType):
 def command(**given: Any) -> None:
     """Read, fit, print, save and draw."""
     options.require_outputs(given, (".nc", ".json"))
-    options.require_outputs({"save": None, "plot": given["direct"], "theme": None})
+    options.require_outputs({"plot": given["direct"], "theme": None})
     free = _names(given["free"])
     closures = _closures(given)
     # The slope may come with the file.
