@@ -531,17 +531,16 @@ def chosen(found: FlowSet, which: int | None) -> Flow:
 
 
 def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None = None) -> dict[str, Any]:
-    """Tolerance and range of the options, as far as they are given, as arguments of the analyses; a unit counts by
-    ``scales`` on a chute of ``slope``.
+    """Tolerance and range of the options, as far as a command has them and they are given, as arguments of the analyses;
+    a unit counts by ``scales`` on a chute of ``slope``.
 
     Raises:
         InputError: for a unit without grains, or of another kind.
     """
-    arguments = {
-        "tolerance": given.get("tolerance"),
-        "surface_temperature": own(given, "search_temperature", "surface_temperature", slope, scales),
-        "largest_holdup": own(given, "largest_holdup", "mass_holdup", slope, scales),
-    }
+    arguments = {"tolerance": given.get("tolerance")}
+    if "search_temperature" in given:
+        arguments["surface_temperature"] = own(given, "search_temperature", "surface_temperature", slope, scales)
+        arguments["largest_holdup"] = own(given, "largest_holdup", "mass_holdup", slope, scales)
     return {name: value for name, value in arguments.items() if value is not None}
 
 
