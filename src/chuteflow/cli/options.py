@@ -531,8 +531,8 @@ def chosen(found: FlowSet, which: int | None) -> Flow:
 
 
 def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None = None) -> dict[str, Any]:
-    """Tolerance and range of the options, as far as a command has them and they are given, as arguments of the analyses;
-    a unit counts by ``scales`` on a chute of ``slope``.
+    """Tolerance and range of the options, as far as a command has them and they are given, as arguments of the
+    analyses; a unit counts by ``scales`` on a chute of ``slope``.
 
     Raises:
         InputError: for a unit without grains, or of another kind.

@@ -20,6 +20,9 @@ def loading(path: str | os.PathLike[str], otherwise: str) -> Iterator[None]:
         InputError: for a file that is missing, damaged or refused in the block, in one line that names it.
     """
     try:
+        # What a library says of a file that cannot be opened is longer.
+        with open(path, "rb"):
+            pass
         yield
     except InputError as error:
         raise InputError(f"cannot load {path}: {error}") from None
