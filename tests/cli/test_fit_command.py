@@ -174,6 +174,7 @@ def test_bad_data_are_one_line(content, said, tmp_path, capsys):
         (["fit", "{data}", *PAPER, "--free", "e", "--range", "e"], "is not a range"),
         (["fit", "{data}", *PAPER, "--free", "e", "--out", "fit.txt"], "must end in .nc or .json"),
         (["predict", "{data}", "--flux", "3"], "must end in .nc or .json"),
+        (["predict", "{data}.nc", "--flux", "3"], "cannot load"),
         (["predict", "{data}.nc", "--flux", "3"], "No such file or directory\n"),
         (["sensitivities", *PAPER, "--flux", "3", "--fixed", "u"], "choose one of T_surface, Q, M, h"),
         (["sensitivities", *PAPER, "--flux", "3", "--parameters", "e,x"], "unknown parameter 'x'"),
