@@ -15,12 +15,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 IMAGES = Path(__file__).parent / "images"
+MEASURED = Path(__file__).parent / "measured" / "particles"
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
 COMMANDS = {
     "three-flows": f"solve {PAPER} --flux 3",
     "curve": f"curve {PAPER}",
     "growth": f"growth {PAPER} --flux 3 --kx 0:0.02 --ky 0:0.03 --size 20x20",
     "neutral": f"neutral {PAPER} --waves across --size 16x16",
+    "compared": f"compare {MEASURED}/hot01-triangular-2.csv --with lun,garzo-dufty-fourier",
     "stability-curve": f"curve {PAPER} --search-temperature 0.05:50 --points 80 --stability --samples 12",
 }
 

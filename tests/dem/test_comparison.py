@@ -140,6 +140,14 @@ def test_the_picture_shows_the_measured_profile_and_the_flows(itself):
     assert nearest == pytest.approx(np.interp(0.5, share[::-1], itself.fields["volume_fraction"][::-1]), rel=1e-3)
 
 
+def test_the_picture_has_no_empty_layer_below_the_grains(itself):
+    below = {name: np.concatenate([[1e-3 * values[0]], values[1:]]) for name, values in itself.fields.items()}
+    assert itself.share[0] > 0.99
+    figure = plot_comparison(compare(replace(itself, fields=below), ["lun"]))
+    nu = np.asarray(figure.axes[0].get_lines()[0].get_xdata())
+    np.testing.assert_allclose(nu[0], itself.fields["volume_fraction"][1])
+
+
 # Files
 
 

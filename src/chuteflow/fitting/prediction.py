@@ -31,8 +31,8 @@ from chuteflow.steady.sensitivity import Sensitivity, sensitivity
 _TURNING = {"fold-Q": (LOG_Q, "Q"), "fold-M": (LOG_M, "M"), "fold-T": (LOG_T, "T_surface")}
 #: Heights of profiles.
 _HEIGHTS = 121
-#: Points of a branch that a band is drawn through, about.
-_POINTS = 60
+#: Points of the curve, through which bands are drawn.
+_POINTS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class Prediction:
     @cached_property
     def curve(self) -> Curve:
         """The families of flows."""
-        return curve(self.calibration.chute)
+        return curve(self.calibration.chute, points=_POINTS)
 
     @cached_property
     def bands(self) -> tuple[Band, ...]:
@@ -177,9 +177,8 @@ def _predicted(flow: Flow, calibration: Calibration, at: str) -> PredictedFlow:
 
 
 def _band(branch: Sequence[Flow], calibration: Calibration) -> Band:
-    kept = branch[:: max(1, len(branch) // _POINTS)]
     points, normals, errors = [], [], []
-    for flow in kept:
+    for flow in branch:
         answer = sensitivity(flow, calibration.keys)
         plane = [LOG_Q, LOG_H]
         tangent = answer.tangent[plane]

@@ -22,6 +22,9 @@ _RATIOS = {
     "g2": r"$-P_{xz}/(g_2\sqrt{T}\,u')$",
     "g5": r"$\gamma/(g_5 T^{3/2})$",
 }
+#: Measured layers are shown with this share of the mass above them, or more, and with this part of the largest volume
+#: fraction, or more, near the base: others hold hardly a grain.
+_HIGHEST, _EMPTY = 0.02, 0.02
 #: Errors shown by a band, and points of a line of the theory.
 _BAND, _POINTS = 2.0, 161
 _DASHES = {"area": style.SOLID, "spacing": style.DASHED}
@@ -33,7 +36,10 @@ def plot_comparison(found: Comparison) -> Figure:
     below, the measured functions over those of each law."""
     figure, axes = style.panels(3, 2, height=5.6)
     measured, share = found.measured, found.measured.share
-    good = np.isfinite(measured.fields["granular_temperature"]) & (share >= 0.02)
+    nu = measured.fields["volume_fraction"]
+    good = np.isfinite(measured.fields["granular_temperature"]) & (share >= _HIGHEST)
+    # Layers below the lowest grains.
+    good &= (share < 0.5) | (nu > _EMPTY * np.nanmax(nu))
     for ax, (name, text) in zip(axes[:3], _FIELDS.items(), strict=True):
         values = measured.fields[name]
         if name in measured.errors:
@@ -44,7 +50,7 @@ def plot_comparison(found: Comparison) -> Figure:
         ax.plot(values[good], share[good], color=style.BLACK, linewidth=0.0, marker=".", markersize=3.0)
         style.name_axes(ax, text, "share above, $p/M$" if ax is axes[0] else None)
     closures = [one.closure for one in found.functions]
-    at = np.linspace(0.02, 1.0, _POINTS)
+    at = np.linspace(_HIGHEST, 1.0, _POINTS)
     handles = {}
     for one in found.candidates:
         if one.condition == "M":

@@ -50,14 +50,15 @@ def plot_prediction(found: Prediction) -> Figure:
             value, error = one.profiles[name]
             stroke = style.stroke(i)
             width = found.widths * np.where(np.isfinite(error), error, 0.0)
-            low = np.maximum(value - width, 0.0)
-            panel.fill_betweenx(one.height, low, value + width, color=stroke.colour, alpha=_SHADE, linewidth=0.0)
+            largest = found.calibration.chute.law.densest if name == "volume_fraction" else np.inf
+            low, high = np.maximum(value - width, 0.0), np.minimum(value + width, largest)
+            panel.fill_betweenx(one.height, low, high, color=stroke.colour, alpha=_SHADE, linewidth=0.0)
             panel.plot(value, one.height, **stroke.line())
         if tops and max(tops) > 6.0 * min(tops):
             panel.set_yscale("symlog", linthresh=min(tops))
         quantity = FIELDS[name]
         style.name_axes(panel, f"{name.replace('_', ' ')}, ${quantity.latex}$", style.label("height"))
-    style.caption(figure, f"bands of {found.confidence:.0%} confidence")
+    style.caption(figure, f"bands of {found.confidence:.0%} confidence, to first order in the errors of the parameters")
     return figure
 
 

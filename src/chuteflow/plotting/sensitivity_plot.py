@@ -26,7 +26,7 @@ def plot_sensitivities(found: Sequence[Sensitivity]) -> Figure:
     figure, axes = style.panels(columns, rows, width=2.6 * columns + 0.6, height=2.9 * rows)
     for ax, one in zip(axes, found, strict=False):
         names = [n for n in _SHOWN if NUMBERS[n].symbol != one.at]
-        # A parameter that is 0 changes by one per cent of 1.
+        # A parameter that is 0 changes by one hundredth, which is said beside it.
         changes = np.where(one.values == 0.0, 1.0, one.values)
         elasticity = np.array([one.logarithmic[name] * changes for name in names])
         if one.at_fold:
@@ -45,7 +45,8 @@ def plot_sensitivities(found: Sequence[Sensitivity]) -> Figure:
                 label=f"${NUMBERS[name].latex}$" if ax is axes[0] else None,
             )
         ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
-        ax.set_yticks(np.arange(len(order)), [f"${one.parameters[j].latex}$" for j in order], math_fontfamily="stix")
+        ticks = [f"${one.parameters[j].latex}$" + (" (by 0.01)" if one.values[j] == 0.0 else "") for j in order]
+        ax.set_yticks(np.arange(len(order)), ticks, math_fontfamily="stix")
         flow = one.flow
         at = f"Q = {flow.mass_flux:.3g}, M = {flow.mass_holdup:.3g}"
         style.name_axes(ax, f"change in per cent for 1 %,\nat fixed ${_latex(one.at)}$ ({at})", None)
