@@ -180,7 +180,7 @@ class Flow(Result):
     @property
     def base_volume_fraction(self) -> float:
         """nu at the base."""
-        return float(_density(self._state.x, self._state.f)[-1])
+        return self._below_packing(_density(self._state.x, self._state.f)[-1])
 
     @property
     def slip_velocity(self) -> float:
@@ -190,7 +190,11 @@ class Flow(Result):
     @cached_property
     def largest_volume_fraction(self) -> float:
         """The largest nu in the flow."""
-        return float(self._at_share(self._share_of_largest)[0]["nu"][0])
+        return self._below_packing(self._at_share(self._share_of_largest)[0]["nu"][0])
+
+    def _below_packing(self, nu: float) -> float:
+        """A volume fraction, which rounding does not lift to that of the densest packing, where grains cannot come."""
+        return min(float(nu), float(np.nextafter(self.law.densest, 0.0)))
 
     @property
     def interface_height(self) -> float:
