@@ -9,7 +9,7 @@ import pytest
 import chuteflow
 from chuteflow import display
 from chuteflow.maps import Domain
-from chuteflow.stability.along import MarkedBranch, MarkedCurve, Run, Sample
+from chuteflow.stability.along import MarkedBranch, MarkedCurve, Sample, StabilityRun
 from chuteflow.stability.neutral import NeutralCurve
 from chuteflow.stability.planes import FamilyMap, WaveMap
 
@@ -45,7 +45,7 @@ def public_results():
     stability = chuteflow.stability_of(paper_flows()[2], kx=0.01, ky=0.0)
     branch = paper_curve().branches[0]
     sample = Sample(0.0, paper_flows()[2], stability)
-    marked = MarkedBranch(branch, (sample,) * 24, (Run("stable", branch.flows),), ())
+    marked = MarkedBranch(branch, (sample,) * 24, (StabilityRun("stable", branch.flows),), ())
     return [
         CHUTE,
         paper_flows(),

@@ -60,7 +60,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Condition:
+class FlowCondition:
     """A number that picks flows out of a family.
 
     ``key`` is the argument of :func:`chuteflow.flows` and the symbol in JSON and studies, ``quantity`` the name in the
@@ -157,12 +157,12 @@ WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
 
 _LEAST, _MOST = 1e-12, 1e12
 #: Conditions on the flows of a chute, by their keys.
-CONDITIONS: dict[str, Condition] = {
+CONDITIONS: dict[str, FlowCondition] = {
     condition.key: condition
     for condition in (
-        Condition("T_surface", "surface_temperature", "temperature", *WIDEST, "surface temperature"),
-        Condition("Q", "mass_flux", "flux", _LEAST, _MOST, "mass flux"),
-        Condition("M", "mass_holdup", "holdup", _LEAST, DEEPEST, "mass hold-up"),
-        Condition("h", "centre_of_mass", "centre_of_mass", _LEAST, _MOST, "centre of mass"),
+        FlowCondition("T_surface", "surface_temperature", "temperature", *WIDEST, "surface temperature"),
+        FlowCondition("Q", "mass_flux", "flux", _LEAST, _MOST, "mass flux"),
+        FlowCondition("M", "mass_holdup", "holdup", _LEAST, DEEPEST, "mass hold-up"),
+        FlowCondition("h", "centre_of_mass", "centre_of_mass", _LEAST, _MOST, "centre of mass"),
     )
 }

@@ -13,7 +13,7 @@ import pytest
 from chuteflow import Chute, curve, flows
 from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import model
@@ -30,7 +30,7 @@ def macroscopic(flow):
 
 
 def searched(chute):
-    return Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    return SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
 
 
 def scanned(chute):

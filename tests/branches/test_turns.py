@@ -9,7 +9,7 @@ import pytest
 from chuteflow import Chute, curve, flows
 from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import Chord, turns
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.rough_turns import dips, may_turn
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
@@ -22,7 +22,7 @@ FOLDS = {1e-5: (897.18333, 897.193459), 3e-5: (899.026048, 899.078891), 1e-3: (9
 
 
 def branches(chute):
-    within = Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    within = SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
     return traced_families(model(chute), within)
 
 

@@ -18,7 +18,16 @@ from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
-from chuteflow.paper.sources import NOT_REACHED, OVERBURDEN, Mapped, MappedCurves, Source, Unreached, reach, source
+from chuteflow.paper.sources import (
+    NOT_REACHED,
+    OVERBURDEN,
+    Mapped,
+    MappedCurves,
+    Source,
+    UnreachedBranch,
+    reach,
+    source,
+)
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.steady.mapped.curve import TOLERANCE, MappedCurve
 from chuteflow.steady.mapped.solution import MappedSolution
@@ -172,7 +181,7 @@ def test_where_the_mapped_method_ends_is_said(cut_short):
 
 
 def test_a_family_out_of_reach_is_said(cut_short):
-    lost = replace(cut_short, branches=(), unreached=(Unreached((0.001, 0.005), "no series converges"),))
+    lost = replace(cut_short, branches=(), unreached=(UnreachedBranch((0.001, 0.005), "no series converges"),))
     assert reach(lost) == [
         f"{NOT_REACHED}: a family with surface temperatures from 0.001 to 0.005: no series converges"
     ]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from chuteflow.paper.claims import CLAIMS, stability
-from chuteflow.stability.budget import Budget, Term
+from chuteflow.stability.budget import ModeBudget, Term
 
 IDS = ("three-unstable-modes", "stable-in-a-small-part", "inversion-and-stability")
 
@@ -53,7 +53,7 @@ def budget(loss, shear, closure=1e-9):
     """A budget with what the loss feeds in all, and the shear."""
     parts = ("collisional loss by density", 3.0 * loss), ("collisional loss by temperature", -2.0 * loss)
     terms = tuple(Term(name, thermal=rate) for name, rate in (*parts, ("shear production", shear)))
-    return Budget(SimpleNamespace(growth=0.01, direction="along"), terms, (0.3, 0.4, 0.3), closure)  # pyright: ignore[reportArgumentType]
+    return ModeBudget(SimpleNamespace(growth=0.01, direction="along"), terms, (0.3, 0.4, 0.3), closure)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

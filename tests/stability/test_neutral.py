@@ -10,7 +10,7 @@ import pytest
 import chuteflow
 from chuteflow.errors import InputError
 from chuteflow.stability.modes import Disturbances
-from chuteflow.stability.neutral import Scan, neutral_curves
+from chuteflow.stability.neutral import EigenvalueGrid, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, family_map, wave_map
 from chuteflow.stability.verdict import leading
 
@@ -32,7 +32,7 @@ class KnownPlane:
     def scan(self, points):
         a = b = np.linspace(0.0, 1.0, points)
         leading = self.growth(a[:, None], b) + 0.3j * a[:, None]
-        return Scan(a, b, np.where(leading.real > -2e-5, leading, -2e-5))
+        return EigenvalueGrid(a, b, np.where(leading.real > -2e-5, leading, -2e-5))
 
 
 def circle(a, b, centre=(0.5, 0.5), radius=0.3):
@@ -69,7 +69,7 @@ def test_no_curve_is_made_up_where_growth_is_not_known():
     plane = KnownPlane(lambda a, b: 0.1 * (b - 0.5) + 0.0 * a)
     scan = plane.scan(9)
     unknown = np.broadcast_to(scan.b > 0.3, scan.sigma.shape)
-    masked = Scan(scan.a, scan.b, np.where(unknown, np.nan, scan.sigma), unresolved=unknown)
+    masked = EigenvalueGrid(scan.a, scan.b, np.where(unknown, np.nan, scan.sigma), unresolved=unknown)
     assert len(neutral_curves(plane, scan)) == 1
     assert neutral_curves(plane, masked) == []
 

@@ -13,15 +13,15 @@ import numpy as np
 from chuteflow import display
 from chuteflow.bifurcations import seeds
 from chuteflow.bifurcations.points import BoundaryPoint
-from chuteflow.bifurcations.system import Sweep
+from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
 from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import LineOfFlows, Searched
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control
+from chuteflow.numerics.continuation import ContinuationSettings
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
@@ -194,7 +194,7 @@ def boundary(
     tolerance: float = TOLERANCE,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
     progress: Callable[[str, float], object] = lambda what, share: None,
 ) -> BoundarySet:
     """Follow every boundary of a kind over a range of a second parameter, through its turning points.
@@ -219,7 +219,7 @@ def boundary(
     sweep = _checked(chute, of, second, bounds)
     samples = whole("samples", samples, 2, 1000)
     tolerance = checked_tolerance(tolerance)
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
     entered: list[tuple[TracedFamily, ...]] = []
@@ -269,13 +269,13 @@ def boundary(
     )
 
 
-def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> Sweep:
+def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> SecondParameter:
     if of not in KINDS:
         raise InputError(f"cannot follow {of!r}: choose one of {', '.join(KINDS)}")
     if second not in PARAMETERS:
         raise InputError(f"unknown second parameter {second!r}: choose one of {', '.join(PARAMETERS)}")
     low, high = pair("bounds", bounds)
-    sweep = Sweep(chute, second, low, high)
+    sweep = SecondParameter(chute, second, low, high)
     for value in (low, high):
         end = sweep.chute_at(value)  # which says what is allowed
         if end.surface == "free":
@@ -285,7 +285,9 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
     return sweep
 
 
-def _families(sweep: Sweep, value: float, spacing: float, within: Range) -> tuple[list[TracedFamily] | None, float]:
+def _families(
+    sweep: SecondParameter, value: float, spacing: float, within: SearchRange
+) -> tuple[list[TracedFamily] | None, float]:
     """The families of flows at a value of the parameter, or close by where they cannot be told apart just there."""
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))

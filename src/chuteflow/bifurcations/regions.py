@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
-from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion
+from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
 from chuteflow.bifurcations.points import BoundaryPoint, solved
 from chuteflow.bifurcations.seeds import FOLDS, HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.bifurcations.tracing import TracedBoundary, traced
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import solve_each
@@ -59,12 +59,12 @@ def limits(found: BoundarySet) -> list[Boundary]:
     Raises:
         SolveError: where one could not be followed.
     """
-    sweep = Sweep(found.chute, found.second, *found.bounds)
-    within = Range.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
+    sweep = SecondParameter(found.chute, found.second, *found.bounds)
+    within = SearchRange.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
     edges = (
-        (Held(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
-        (Held(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
-        (Held(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
+        (FixedQuantity(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
+        (FixedQuantity(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
+        (FixedQuantity(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
     )
     out: list[Boundary] = []
     for condition, wider in edges:
@@ -80,7 +80,7 @@ def limits(found: BoundarySet) -> list[Boundary]:
     return out
 
 
-def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solution]:
+def _ends(families: tuple[TracedFamily, ...], condition: FixedQuantity) -> Iterator[Solution]:
     for family in families:
         for solution in (family.solutions[0], family.solutions[-1]):
             if abs(float(solution.macroscopic[condition.which]) - condition.value) < _AT_EDGE:

@@ -16,20 +16,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion, Local
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, Linearisation, TestFunction
 from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.families import TracedFamily, traced_families
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.numerics.roots import bisected
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
-from chuteflow.steady.solver import Condition as SolverCondition
-from chuteflow.steady.solver import Solution, resolve
+from chuteflow.steady.solver import Condition, Solution, resolve
 
 #: The kinds of boundaries, and the quantities whose folds they are.
 FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
@@ -54,7 +53,7 @@ _LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
+class _SampledFlow:
     """A flow of a family, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
     plane (ln M, ln T_surface), (2, n+3), and the Jacobian of the steady problem."""
 
@@ -72,7 +71,7 @@ class _Sample:
         return float(self.gradient @ solve_each(matrix, side))
 
 
-def conditions(kind: str) -> Sequence[Condition]:
+def conditions(kind: str) -> Sequence[TestFunction]:
     """The conditions of a kind of boundary."""
     if kind in FOLDS:
         return [Fold(FOLDS[kind])]
@@ -80,8 +79,8 @@ def conditions(kind: str) -> Sequence[Condition]:
 
 
 def on_families(
-    sweep: Sweep,
-    condition: Condition,
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
     families: Sequence[TracedFamily],
     reach: float,
@@ -108,12 +107,14 @@ def _in_one_piece(family: TracedFamily) -> list[Solution]:
     return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
 
 
-def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
+def families_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedFamily]:
     """Every family of flows in a range at one value of the parameter."""
     return traced_families(model(sweep.chute_at(value)), within)
 
 
-def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
+def _from_flow(
+    sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution, tolerance: float
+) -> BoundaryPoint:
     """The point of the boundary at a value of the parameter, from its flow."""
     w = np.append(solution.z, value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
@@ -121,7 +122,7 @@ def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solut
 
 
 def _zeros(
-    sweep: Sweep, condition: Condition, value: float, samples: Sequence[_Sample], tolerance: float
+    sweep: SecondParameter, condition: TestFunction, value: float, samples: Sequence[_SampledFlow], tolerance: float
 ) -> list[BoundaryPoint]:
     """The points along a family where the condition's function vanishes."""
     found: list[BoundaryPoint] = []
@@ -133,7 +134,13 @@ def _zeros(
 
 
 def _between(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, tolerance: float, halvings: int
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    tolerance: float,
+    halvings: int,
 ) -> Iterator[BoundaryPoint]:
     """The points between two flows: as the cubic through both says, or those in both halves."""
     chord = (last.solution.macroscopic - first.solution.macroscopic)[LOG_M:]
@@ -166,7 +173,13 @@ def _places(f0: float, f1: float, d0: float, d1: float) -> list[float]:
 
 
 def _near(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, sigma: float, tolerance: float
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    sigma: float,
+    tolerance: float,
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
@@ -190,7 +203,7 @@ def _near(
     return point if inside and beside <= _BESIDE * length else None
 
 
-def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple[int, Array]]:
+def _nearest(samples: Sequence[_SampledFlow], condition: TestFunction) -> Iterator[tuple[int, Array]]:
     """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
     plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
     chords = np.diff(plane, axis=0)
@@ -209,8 +222,8 @@ def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple
 
 
 def _beside(
-    sweep: Sweep,
-    condition: Condition,
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
     solution: Solution,
     chord: Array,
@@ -219,7 +232,7 @@ def _beside(
 ) -> BoundaryPoint | None:
     """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
     row = np.array([chord[1], chord[0], 0.0])
-    plane = SolverCondition.plane(chord, solution.macroscopic)
+    plane = Condition.plane(chord, solution.macroscopic)
     at = value
     for _ in range(_WALK):
         w = np.append(solution.z, at)
@@ -249,15 +262,15 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
     return bool(np.abs(gap).max() < 1e-7)
 
 
-def _sample(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> _Sample:
+def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution) -> _SampledFlow:
     here, beyond = sweep.models(value)
     degree, stretch = solution.problem.degree, solution.problem.stretch
-    at = Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
+    at = Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
     f, gradient = condition.along_family(at)
-    return _Sample(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
+    return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
 
-def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: float) -> list[float]:
+def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
     """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole families.
 
     On the half-line dissipation and production balance at the surface, or at the density where they come nearest
@@ -275,7 +288,7 @@ def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: floa
 
 
 def along_families(
-    sweep: Sweep, condition: Condition, value: float, families: Sequence[TracedFamily], tolerance: float
+    sweep: SecondParameter, condition: TestFunction, value: float, families: Sequence[TracedFamily], tolerance: float
 ) -> Iterator[BoundaryPoint]:
     """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
     for family in families:
@@ -289,14 +302,14 @@ def along_families(
             yield through(system, w, tolerance)
 
 
-def _at_surface(sweep: Sweep, value: float) -> float:
+def _at_surface(sweep: SecondParameter, value: float) -> float:
     """Net loss at the surface of the half-line."""
     here, _ = sweep.models(value)
     f, _ = here.closures(np.zeros(1))
     return float(f[LOSS, 0] - here.slope**2 * f[WORK, 0])
 
 
-def _least(sweep: Sweep, value: float) -> float:
+def _least(sweep: SecondParameter, value: float) -> float:
     """The least net loss at any density."""
     here, _ = sweep.models(value)
     (low, high), least = _LOG_X, np.inf

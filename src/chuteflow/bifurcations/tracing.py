@@ -7,21 +7,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Fold, InteriorChange, Local, along
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
 from chuteflow.bifurcations.edges import left
 from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
 from chuteflow.bifurcations.seeds import HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.branches.ranges import Range
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative
-from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, locate, trace
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.elements import DEGREES
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
+CONTROL = ContinuationSettings(
+    initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000
+)
 #: A boundary is closed where it passes its start within this part of the step, in about its direction.
 _CLOSE, _ALONG = 0.05, 0.9
 #: Below this share of the quantity in the null vector, the family itself is singular.
@@ -39,7 +41,7 @@ _NO_RATE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class BoundaryTurn:
     """A turning point in the second parameter: its ``kind``, one of TURNS, and the index of the point before it."""
 
     kind: str
@@ -60,9 +62,9 @@ TURNS = {
 class TracedBoundary:
     """A boundary as far as it goes within its range: points in order, turns, and in words why it ends."""
 
-    sweep: Sweep
+    sweep: SecondParameter
     points: tuple[BoundaryPoint, ...]
-    turns: tuple[Turn, ...]
+    turns: tuple[BoundaryTurn, ...]
     ends: tuple[str, str]
 
     def holds(self, point: BoundaryPoint) -> bool:
@@ -122,16 +124,16 @@ class _Side:
     """What one side of a boundary is made of, from the start outwards."""
 
     points: list[BoundaryPoint] = field(default_factory=list)
-    turns: list[Turn] = field(default_factory=list)
+    turns: list[BoundaryTurn] = field(default_factory=list)
     end: str = ""
     closed: bool = False
 
 
 def traced(
     start: BoundaryPoint,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
     notice: Callable[[], object] = lambda: None,
 ) -> TracedBoundary:
     """The boundary through ``start`` to both sides; ``notice`` is called at each point.
@@ -147,8 +149,8 @@ def traced(
         return TracedBoundary(sweep, points, tuple(onward.turns), (onward.end, onward.end))
     back = _side(start, -tangent, within, tolerance, control, notice)
     last = len(back.points) - 1
-    turns = [Turn(t.kind, t.point, last - 1 - t.position) for t in reversed(back.turns)]
-    turns += [Turn(t.kind, t.point, last + t.position) for t in onward.turns]
+    turns = [BoundaryTurn(t.kind, t.point, last - 1 - t.position) for t in reversed(back.turns)]
+    turns += [BoundaryTurn(t.kind, t.point, last + t.position) for t in onward.turns]
     points = (*back.points[:0:-1], *onward.points)
     return TracedBoundary(sweep, points, tuple(turns), (back.end, onward.end))
 
@@ -156,9 +158,9 @@ def traced(
 def _side(
     start: BoundaryPoint,
     tangent: Array,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control,
+    control: ContinuationSettings,
     notice: Callable[[], object],
 ) -> _Side:
     side = _Side([start])
@@ -178,17 +180,17 @@ def _side(
         if ended:
             return side
         before = point
-    corner = path.status is Status.SHARP_TURN and isinstance(system.condition, InteriorChange)
+    corner = path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange)
     side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
     return side
 
 
 def _extended(
     side: _Side,
-    first: Point[BoundarySystem],
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
-    within: Range,
+    first: CurvePoint[BoundarySystem],
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
+    within: SearchRange,
     tolerance: float,
 ) -> bool:
     """Add what a step leads to, and tell whether the side ends there.
@@ -214,8 +216,8 @@ def _extended(
 
 def _note_turn(
     side: _Side,
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
     tolerance: float,
     last: BoundaryPoint | None = None,
 ) -> None:
@@ -229,10 +231,10 @@ def _note_turn(
         row = before.system.weights[-3:] * (point.z - before.z)[-3:]
         if row @ turn.w[-3:] > row @ last.w[-3:]:
             return
-    side.turns.append(Turn(_kind(turn), turn, len(side.points) - 1))
+    side.turns.append(BoundaryTurn(_kind(turn), turn, len(side.points) - 1))
 
 
-def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) -> BoundaryPoint:
+def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], tolerance: float) -> BoundaryPoint:
     """The turning point between two points, on finer grids until it stays where it is."""
     before, settled = np.full(3, np.inf), np.inf
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
@@ -255,7 +257,7 @@ def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) 
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 
 
-def _corrected(system: BoundarySystem, w: Array, near: Point[BoundarySystem]) -> Point[BoundarySystem]:
+def _corrected(system: BoundarySystem, w: Array, near: CurvePoint[BoundarySystem]) -> CurvePoint[BoundarySystem]:
     """A point of another grid that lies where ``near`` does."""
     direction = np.zeros_like(w)
     direction[-3:] = (near.system.weights * near.tangent)[-3:]
@@ -276,7 +278,7 @@ def _kind(point: BoundaryPoint) -> str:
     return "birth" if _definite(at) else "crossing"
 
 
-def _definite(at: Local) -> bool:
+def _definite(at: Linearisation) -> bool:
     """Whether the parameter has an extremum on the surface of flows over (z, lambda), where F_z loses rank.
 
     Its Hessian on the null space of F_z is that of -psi' F, with psi the left null vector.
@@ -288,7 +290,9 @@ def _definite(at: Local) -> bool:
     return bool(np.linalg.det(hessian) > 0.0)
 
 
-def _returned(first: Point[BoundarySystem], before: Point[BoundarySystem], last: Point[BoundarySystem]) -> bool:
+def _returned(
+    first: CurvePoint[BoundarySystem], before: CurvePoint[BoundarySystem], last: CurvePoint[BoundarySystem]
+) -> bool:
     """Whether the last step passed the first point, in its direction, as far as the last three unknowns show."""
     root = np.sqrt(last.system.weights[-3:])
     a, b, c = (root * p.z[-3:] for p in (first, before, last))

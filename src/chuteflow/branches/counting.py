@@ -10,7 +10,7 @@ import numpy as np
 
 from chuteflow.branches.families import trace_all
 from chuteflow.branches.lines import SteadyBranch
-from chuteflow.branches.ranges import BranchEnd, Range
+from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Branch, Curve
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -19,7 +19,7 @@ from chuteflow.steady.model import Model
 
 
 @dataclass(frozen=True)
-class Count:
+class FlowCount:
     """So many ``flows`` at every mass flux from ``low`` to ``high``; ``at_least`` so many where a branch leaves the
     range searched, or is lost, on its way to these fluxes. ``low`` may be 0, and ``high`` infinite."""
 
@@ -29,7 +29,7 @@ class Count:
     at_least: bool
 
 
-def flux_counts(curve: Curve) -> list[Count]:
+def flux_counts(curve: Curve) -> list[FlowCount]:
     """The numbers of flows that share one mass flux, from the smallest flux to the largest, without gaps.
 
     Their edges are the folds and the ends of the branches.
@@ -37,13 +37,13 @@ def flux_counts(curve: Curve) -> list[Count]:
     stretches = [stretch for branch in curve.branches for stretch in _monotonic(branch)]
     rays = [ray for branch in curve.branches for ray in _beyond(branch)]
     edges = sorted({0.0, np.inf, *(edge for stretch in stretches for edge in stretch)})
-    counts: list[Count] = []
+    counts: list[FlowCount] = []
     for low, high in pairwise(edges):
         flows = sum(first <= low and high <= last for first, last in stretches)
         at_least = any(first <= low and high <= last for first, last in rays)
         if counts and (counts[-1].flows, counts[-1].at_least) == (flows, at_least):
             low = counts.pop().low
-        counts.append(Count(low, high, flows, at_least))
+        counts.append(FlowCount(low, high, flows, at_least))
     return counts
 
 
@@ -61,7 +61,7 @@ def most_at_once(stretches: Array, apart: float = 0.0) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def most_solved(problem: Model, within: Range, tolerance: float) -> int | None:
+def most_solved(problem: Model, within: SearchRange, tolerance: float) -> int | None:
     """The largest number of flows in a range that share one mass flux, by branches solved from end to end; None where
     one of them could not be followed."""
     try:

@@ -13,8 +13,8 @@ import numpy as np
 
 from chuteflow.branches.existence import imbalance
 from chuteflow.branches.families import TracedFamily, doubt, search, searched, trace_all
-from chuteflow.branches.paths import Chord, Point, find_zero
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.paths import Chord, PathPoint, find_zero
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.branches.rough_turns import dips
 from chuteflow.checks import whole
@@ -65,7 +65,7 @@ def curve(
     """
     points = whole("points", points, 2, 100_000)
     tolerance = checked_tolerance(tolerance)
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
     found, lost = trace_all(problem, within, tolerance)
     grid = search(problem, within)
@@ -155,7 +155,7 @@ def _of_flow(chute: Chute, quantity: Callable[[Flow], float]) -> Callable[[Solut
 
 def _pair(
     chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float], fraction: float
-) -> list[tuple[float, Point]]:
+) -> list[tuple[float, PathPoint]]:
     """The two zeros to either side of a fraction of a chord, if the sign is another one there."""
     middle = chord.at(fraction)
     if middle is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
 from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import FlowSet, FlowSets
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
@@ -99,7 +99,7 @@ def flows(
     """
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     if not named or np.ndim(named[0][1]) == 0:
         return flows_within(chute, *asked(given), tolerance, within)
     name, several = named[0]
@@ -113,7 +113,7 @@ def flows(
 
 @on_one_thread
 @np.errstate(under="ignore")
-def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: Range) -> FlowSet:
+def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> FlowSet:
     """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
@@ -141,11 +141,11 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _BranchSearch:
     """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
     rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
 
-    within: Range
+    within: SearchRange
     families: tuple[Family, ...]
     solutions: list[Solution]
     beyond: list[Solution]
@@ -153,7 +153,7 @@ class _Search:
     grid: TrajectoryGrid
 
 
-def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
+def _search(problem: Model, which: int, value: float, tolerance: float, within: SearchRange) -> _BranchSearch:
     found = families(problem, within)
     solutions: list[Solution] = []
     lost: list[Array] = []
@@ -163,7 +163,7 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
         lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _Search(within, found, inside, beyond, lost, search(problem, within))
+    return _BranchSearch(within, found, inside, beyond, lost, search(problem, within))
 
 
 def asked(given: Mapping[str, Any]) -> tuple[int, float]:
@@ -182,7 +182,7 @@ def asked(given: Mapping[str, Any]) -> tuple[int, float]:
 
 
 @dataclass(frozen=True)
-class _Lead:
+class _Extrapolation:
     """Where a family leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
     LOG_T or LOG_M, there to reach the value at about ``place``, a logarithm."""
 
@@ -191,7 +191,7 @@ class _Lead:
     place: float
 
 
-def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
+def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapolation]:
     target = float(np.log(value))
     for family in search.families:
         m = family.macroscopic
@@ -202,10 +202,10 @@ def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
                 run = float(end[axis] - before[axis])
                 slope = float(end[which] - before[which]) / run if run else 0.0
                 if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
-                    yield _Lead(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
+                    yield _Extrapolation(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
 
 
-def _left_out(found: _Search, which: int, value: float) -> str | None:
+def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
     left = doubt(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
     if left is not None:
@@ -221,7 +221,7 @@ def _left_out(found: _Search, which: int, value: float) -> str | None:
     return None
 
 
-def _wider(found: _Search, which: int, value: float) -> Range:
+def _wider(found: _BranchSearch, which: int, value: float) -> SearchRange:
     """The range with which branches that lead out of it towards ``value`` reach it."""
     within = wider = found.within
     axes = (LOG_T, LOG_M) if len(found.families) <= _MOST_DEEPER else (LOG_T,)

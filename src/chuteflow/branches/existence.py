@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.model import LOSS, WORK, Model
 from chuteflow.theory.bases import BASES
@@ -19,7 +19,7 @@ _NAMES = ("Q", "h", "M", "T_surface")
 _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
 
 
-def reason_for_none(model: Model, families: Sequence[Array], which: int, value: float, within: Range) -> str:
+def reason_for_none(model: Model, families: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
     """One sentence on why no flow was found, given the quantities (k, 4) of the families that were."""
     if families:
         spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in families]
@@ -62,7 +62,7 @@ def imbalance(model: Model) -> str:
     return "no flow balances the energy gained and lost"
 
 
-def _searched(within: Range) -> str:
+def _searched(within: SearchRange) -> str:
     return (
         f"searched: surface temperatures {within.coldest:.3g} to {within.hottest:.3g}, hold-ups to {within.deepest:.3g}"
     )

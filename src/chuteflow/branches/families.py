@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.paths import Chord, Point, Turn, find_value, point_at, refined, turns
-from chuteflow.branches.ranges import BranchEnd, Range
+from chuteflow.branches.paths import Chord, PathPoint, TurningPoint, find_value, point_at, refined, turns
+from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -75,7 +75,7 @@ class Family:
     """
 
     rough: RoughBranch
-    within: Range
+    within: SearchRange
     pieces: tuple[tuple[int, Array], ...] = ()
     separate: bool = True
 
@@ -109,7 +109,7 @@ class Family:
         m = self.macroscopic
         return float(np.linalg.norm(m[i] - 0.5 * (m[max(i - 1, 0)] + m[min(i + 1, len(m) - 1)])))
 
-    def solved(self, i: int, tolerance: float) -> Point | None:
+    def solved(self, i: int, tolerance: float) -> PathPoint | None:
         """The flow at rough flow ``i``: in the plane normal to the branch, or at the edge of the range. None where it
         is not found near there."""
         weights = self._direction(i)
@@ -129,9 +129,9 @@ class Family:
             return None
         return point
 
-    def _solved_near(self, places: list[int], tolerance: float) -> list[Point]:
+    def _solved_near(self, places: list[int], tolerance: float) -> list[PathPoint]:
         """The flows at some rough ones in order, without those that lead nowhere."""
-        found: list[Point] = []
+        found: list[PathPoint] = []
         for i in places:
             # Where one rough flow leads nowhere its neighbour may.
             tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if 0 <= k < len(self.macroscopic))
@@ -140,7 +140,7 @@ class Family:
                 found.append(point)
         return found
 
-    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
+    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[PathPoint]:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
         it, and goes away from it beyond, so that a fold near to the target lies between; or they are ends of the
@@ -150,7 +150,7 @@ class Family:
             SolveError: where the branch could not be followed.
         """
 
-        def tried(places: list[int], outward: float) -> tuple[int, Point]:
+        def tried(places: list[int], outward: float) -> tuple[int, PathPoint]:
             """The first that is on its side, where the quantity goes away from the target outwards; or an end of the
             branch that is on the other side; or one that is on its side at least."""
             second = None
@@ -190,7 +190,7 @@ class Family:
             while len(found) > 1 and _is_behind(found[0], found[-1]):
                 found.pop()
             found = [*found, found[0]] if len(found) > 2 else []
-        pieces: list[list[Point]] = [found[:1]]
+        pieces: list[list[PathPoint]] = [found[:1]]
         for one, other in pairwise(found):
             try:
                 pieces[-1] += refined([one, other], tolerance)[1:]
@@ -227,7 +227,7 @@ class Family:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def families(model: Model, within: Range) -> tuple[Family, ...]:
+def families(model: Model, within: SearchRange) -> tuple[Family, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
     found = [Family(branch, within) for branch in search(model, within).branches if len(branch) > 1]
     pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
@@ -250,12 +250,12 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
     )
 
 
-def search(model: Model, within: Range) -> TrajectoryGrid:
+def search(model: Model, within: SearchRange) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
     return carry_down(model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux)
 
 
-def searched(within: Range, grid: TrajectoryGrid) -> Searched:
+def searched(within: SearchRange, grid: TrajectoryGrid) -> Searched:
     """The range searched, and the cells that the search looked at."""
     cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
     return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
@@ -263,7 +263,7 @@ def searched(within: Range, grid: TrajectoryGrid) -> Searched:
 
 def doubt(
     grid: TrajectoryGrid,
-    within: Range,
+    within: SearchRange,
     lost: list[Array],
     names: tuple[str, str],
     which: int = 0,
@@ -350,7 +350,7 @@ def _turns_near(off: Array, arclength: Array) -> list[int]:
     return found
 
 
-def _is_behind(point: Point, last: Point) -> bool:
+def _is_behind(point: PathPoint, last: PathPoint) -> bool:
     """Whether a point is the last one, or so close that the roughness of the search put it behind."""
     step = point.m - last.m
     length = float(np.linalg.norm(step))
@@ -424,7 +424,7 @@ def _solve_among(
     return None
 
 
-def _on_path(points: list[Point], which: int, target: float, tolerance: float) -> list[Solution]:
+def _on_path(points: list[PathPoint], which: int, target: float, tolerance: float) -> list[Solution]:
     """The flows on a path of solved points at which a quantity takes a value."""
     placed = [(float(i), point) for i, point in enumerate(points)]
     turning = turns(points, which, tolerance)
@@ -455,7 +455,7 @@ def _on_path(points: list[Point], which: int, target: float, tolerance: float) -
     return found
 
 
-def _level(along: list[Point], off: Array) -> list[tuple[int, int]]:
+def _level(along: list[PathPoint], off: Array) -> list[tuple[int, int]]:
     """The first and last points of the pieces on which a quantity, given how far it is ``off`` its value, is at that
     value to the error of the flows at more than one point."""
     at_value = np.abs(off) <= max(point.solution.error for point in along)
@@ -494,7 +494,7 @@ class TracedFamily:
     ``ends`` says in words why it ends at either side; a loop ends with its first flow.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[PathPoint, ...]
     ends: tuple[str, str]
 
     @property
@@ -512,11 +512,11 @@ class TracedFamily:
         """In the space of the macroscopic quantities from the first flow, by chords, (k,)."""
         return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
 
-    def turns(self, which: int, tolerance: float) -> list[Turn]:
+    def turns(self, which: int, tolerance: float) -> list[TurningPoint]:
         """The points at which a quantity turns."""
         return turns(self.points, which, tolerance)
 
-    def at(self, places: Array, tolerance: float) -> list[Point]:
+    def at(self, places: Array, tolerance: float) -> list[PathPoint]:
         """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
         out = []
@@ -531,12 +531,12 @@ class TracedFamily:
         return out
 
 
-def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
+def traced_families(model: Model, within: SearchRange, tolerance: float = 1e-8) -> list[TracedFamily]:
     """Every branch of flows in the range, solved from end to end."""
     return trace_all(model, within, tolerance)[0]
 
 
-def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
+def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
     """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
     found: list[TracedFamily] = []
     lost: list[Array] = []

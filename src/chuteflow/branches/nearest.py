@@ -15,7 +15,7 @@ import numpy as np
 from chuteflow import display
 from chuteflow.branches.enumeration import asked, flows_within
 from chuteflow.branches.families import families, search
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import ChuteflowError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE, Parameter
@@ -87,13 +87,13 @@ def nearest(
     """
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     condition = {name: value for name, value in given.items() if value is not None}
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
-    looked_for = _LookedFor(within)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
+    looked_for = _Target(within)
     quantity = near = None
     if condition:
         (quantity,) = condition
         which, value = asked(given)
-        looked_for = _LookedFor(within.restricted(which, value), which, value)
+        looked_for = _Target(within.restricted(which, value), which, value)
         near = _nearest_value(chute, which, value, within)
     found: dict[str, float | None] = {}
     examined: dict[str, tuple[float, float]] = {}
@@ -103,10 +103,10 @@ def nearest(
 
 
 @dataclass(frozen=True)
-class _LookedFor:
+class _Target:
     """A flow in a range at which the quantity ``which`` has a ``value``, or any where that is None."""
 
-    within: Range
+    within: SearchRange
     which: int = LOG_Q
     value: float | None = None
 
@@ -138,7 +138,7 @@ class _LookedFor:
             return []  # a chute whose law has no meaning there, or that cannot be searched
 
 
-def _nearest_value(chute: Chute, which: int, value: float, within: Range) -> float | None:
+def _nearest_value(chute: Chute, which: int, value: float, within: SearchRange) -> float | None:
     """The value nearest to ``value`` of the quantity ``which`` at which a flow of the chute itself is solved."""
     target = math.log(value)
     ends = [
@@ -165,7 +165,7 @@ def _places(parameter: Parameter, start: float) -> list[float]:
     return sorted((p for p in places if p != start), key=lambda p: abs(p - start))
 
 
-def _first(chute: Chute, parameter: Parameter, looked_for: _LookedFor) -> tuple[float | None, tuple[float, float]]:
+def _first(chute: Chute, parameter: Parameter, looked_for: _Target) -> tuple[float | None, tuple[float, float]]:
     """The nearest value of a parameter that has a flow, moved towards the chute as far as it has one, and the smallest
     and largest value examined."""
     examined = [getattr(chute, parameter.name)]
@@ -181,7 +181,7 @@ def _first(chute: Chute, parameter: Parameter, looked_for: _LookedFor) -> tuple[
     return None, (min(examined), max(examined))
 
 
-def _towards(chute: Chute, parameter: Parameter, place: float, looked_for: _LookedFor) -> Iterator[float]:
+def _towards(chute: Chute, parameter: Parameter, place: float, looked_for: _Target) -> Iterator[float]:
     """Where rough flows meet the condition between the chute and ``place``, the nearest first; nothing where not even
     those at ``place`` do."""
     if not looked_for.on(replace(chute, **{parameter.name: place})):

@@ -38,7 +38,7 @@ _CLOSE, _ROUNDING = 1e-12, 4e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class PathPoint:
     """A solved flow, and the unit ``tangent`` (4,) of its branch."""
 
     solution: Solution
@@ -49,12 +49,12 @@ class Point:
         """ln Q, ln h, ln M, ln T_surface."""
         return self.solution.macroscopic
 
-    def reversed(self) -> Point:
+    def reversed(self) -> PathPoint:
         """The same with the tangent the other way."""
-        return Point(self.solution, -self.tangent)
+        return PathPoint(self.solution, -self.tangent)
 
 
-def point_at(start: Elements, weights: Array, value: float, tolerance: float) -> Point | None:
+def point_at(start: Elements, weights: Array, value: float, tolerance: float) -> PathPoint | None:
     """The point near ``start`` whose quantities, times ``weights`` (4,), sum to ``value``; its tangent goes along them.
 
     None where Newton's method finds none.
@@ -63,10 +63,10 @@ def point_at(start: Elements, weights: Array, value: float, tolerance: float) ->
     if not solution.converged or solution.rates is None:
         return None
     length = float(np.linalg.norm(solution.rates))
-    return Point(solution, solution.rates / length) if np.isfinite(length) else None
+    return PathPoint(solution, solution.rates / length) if np.isfinite(length) else None
 
 
-def _point_between(first: Solution, last: Solution, sigma: float, tolerance: float) -> Point | None:
+def _point_between(first: Solution, last: Solution, sigma: float, tolerance: float) -> PathPoint | None:
     chord = last.macroscopic - first.macroscopic
     direction = chord / np.linalg.norm(chord)
     value = float(direction @ (first.macroscopic + sigma * chord))
@@ -90,8 +90,8 @@ def solve_between(first: Solution, last: Solution, fraction: float, tolerance: f
 class Chord:
     """The branch between two of its points."""
 
-    first: Point
-    last: Point
+    first: PathPoint
+    last: PathPoint
     tolerance: float = TOLERANCE
 
     @cached_property
@@ -122,21 +122,21 @@ class Chord:
         aside = float(np.linalg.norm(mean - (mean @ self.direction) * self.direction))
         return bool(one @ two > np.cos(_ANGLE) and mean @ self.direction > np.cos(_ANGLE) and aside < _ASIDE)
 
-    def at(self, sigma: float) -> Point | None:
+    def at(self, sigma: float) -> PathPoint | None:
         """The point in the plane at ``sigma`` normal to the chord; None where none is found."""
         return _point_between(self.first.solution, self.last.solution, sigma, self.tolerance)
 
-    def slope(self, point: Point) -> Array:
+    def slope(self, point: PathPoint) -> Array:
         """Derivatives (4,) of the quantities with respect to sigma at a point, to about 1e-6."""
         return point.tangent * (self.length / float(point.tangent @ self.direction))
 
-    def sharp_slope(self, point: Point) -> Array:
+    def sharp_slope(self, point: PathPoint) -> Array:
         """The same to rounding: at the flow itself, not at the last but one step of Newton's method."""
         found = point.solution.elements.direction(self.direction)
         return self.slope(point) if found is None else found * self.length
 
 
-def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point]:
+def refined(points: Sequence[PathPoint], tolerance: float = TOLERANCE) -> list[PathPoint]:
     """The points with as many between them as it takes for each chord to suffice.
 
     Raises:
@@ -160,7 +160,7 @@ def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point
     return out
 
 
-def _halfway(chord: Chord) -> Point:
+def _halfway(chord: Chord) -> PathPoint:
     """A point between the ends of a chord."""
     there = chord.first.tangent - chord.last.tangent
     if float(np.linalg.norm(there)) > _OPPOSED:
@@ -182,15 +182,15 @@ def _halfway(chord: Chord) -> Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class TurningPoint:
     """A point at which the quantity ``which`` turns; ``place`` counts along the path: 2.5 is between points 2 and 3."""
 
     which: int
     place: float
-    point: Point
+    point: PathPoint
 
 
-def turns(points: Sequence[Point], which: int, tolerance: float = TOLERANCE) -> list[Turn]:
+def turns(points: Sequence[PathPoint], which: int, tolerance: float = TOLERANCE) -> list[TurningPoint]:
     """The points at which a quantity turns along successive ``points`` that suffice, in order.
 
     Its slope is known exactly at the points. Between two it is a quadratic of them and of the quantity's change, and
@@ -200,15 +200,15 @@ def turns(points: Sequence[Point], which: int, tolerance: float = TOLERANCE) -> 
     found = []
     for i in range(len(points) - 1):
         chord = Chord(points[i], points[i + 1], tolerance)
-        found += [Turn(which, i + place, point) for place, point in _turns(chord, which, _UNKNOWN)]
+        found += [TurningPoint(which, i + place, point) for place, point in _turns(chord, which, _UNKNOWN)]
         if i > 0:
             before, here, after = (float(point.tangent[which]) for point in points[i - 1 : i + 2])
             if abs(here) <= _FLAT < min(abs(before), abs(after)) and before * after < 0.0:
-                found.append(Turn(which, float(i), points[i]))
+                found.append(TurningPoint(which, float(i), points[i]))
     return sorted(found, key=lambda turn: turn.place)
 
 
-def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Point]]:
+def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, PathPoint]]:
     if chord.length < _CLOSEST:
         return
     flat = _FLAT * chord.length
@@ -241,27 +241,29 @@ def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Po
         yield at + (1.0 - at) * place, point
 
 
-def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[float, Point]:
+def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[float, PathPoint]:
     """Where the quantity ``which``, monotonic along the chord, takes the value ``target`` between its ends, to
     ``close`` of the larger distance of these from it."""
 
-    def off(point: Point) -> tuple[float, float | None]:
+    def off(point: PathPoint) -> tuple[float, float | None]:
         return float(point.m[which]) - target, float(chord.slope(point)[which])
 
     return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]), close)
 
 
-def find_zero(chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]) -> tuple[float, Point]:
+def find_zero(
+    chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]
+) -> tuple[float, PathPoint]:
     """Where ``function`` of the flow vanishes along the chord, given its values of opposite sign at the ends."""
     return _located(chord, lambda point: (function(point.solution), None), ends)
 
 
 def _located(
     chord: Chord,
-    function: Callable[[Point], tuple[float, float | None]],
+    function: Callable[[PathPoint], tuple[float, float | None]],
     ends: tuple[float, float],
     close: float = _CLOSE,
-) -> tuple[float, Point]:
+) -> tuple[float, PathPoint]:
     """The zero of a function (its value, and its derivative to sigma where it has one) along a chord.
 
     Newton's method where it stays in the bracket, else regula falsi with the Illinois rule.

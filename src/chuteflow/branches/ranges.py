@@ -42,7 +42,7 @@ class BranchEnd(StrEnum):
 
 
 @dataclass(frozen=True)
-class Range:
+class SearchRange:
     """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
 
     A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
@@ -57,7 +57,9 @@ class Range:
     largest_flux: float = np.inf
 
     @classmethod
-    def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
+    def checked(
+        cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free"
+    ) -> SearchRange:
         """The range given.
 
         Raises:
@@ -73,7 +75,7 @@ class Range:
             raise InputError(f"largest hold-up {largest_holdup:g}: must be from {SHALLOWEST:g} to {DEEPEST:g}")
         return cls(low, high, largest_holdup, SHALLOWEST if surface == "interface" else 0.0)
 
-    def reaching(self, axis: int, value: float) -> Range:
+    def reaching(self, axis: int, value: float) -> SearchRange:
         """The range widened, as far as allowed, to ``value`` of the surface temperature or hold-up."""
         if axis == LOG_M:
             return replace(self, deepest=min(max(self.deepest, value), DEEPEST))
@@ -83,7 +85,7 @@ class Range:
             hottest=min(max(self.hottest, value), WIDEST[1]),
         )
 
-    def restricted(self, which: int, value: float) -> Range:
+    def restricted(self, which: int, value: float) -> SearchRange:
         """The part of the range in which all flows lie at which the quantity ``which`` has a ``value``: no deeper than
         a given hold-up, and with trajectories no further than to a given flux, but for a margin."""
         if which == LOG_M:

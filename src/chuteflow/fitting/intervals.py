@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.fitting.objective import Minimum, Objective
-from chuteflow.fitting.residuals import Place
+from chuteflow.fitting.residuals import TrialFlow
 from chuteflow.numerics.chebyshev import Array
 
 #: How an interval can end, and what that means.
@@ -67,13 +67,13 @@ def interval(objective: Objective, best: Minimum, covariance: Array, which: int,
     Raises:
         BetterFit: where chi2 falls below it on the way.
     """
-    low, low_end = _Side(objective, best, covariance, which, rise, -1.0).end()
-    high, high_end = _Side(objective, best, covariance, which, rise, 1.0).end()
+    low, low_end = _IntervalSide(objective, best, covariance, which, rise, -1.0).end()
+    high, high_end = _IntervalSide(objective, best, covariance, which, rise, 1.0).end()
     return Interval(low, high, (low_end, high_end))
 
 
 @dataclass(eq=False)
-class _Side:
+class _IntervalSide:
     """One side of an interval."""
 
     objective: Objective
@@ -152,7 +152,7 @@ class _Side:
                 moved = self.covariance[:, self.which] / spread * (value - x[self.which])
                 x = x + np.where(np.isfinite(moved), moved, 0.0)
             x[self.which] = value
-            places: Sequence[Place] = start.places
+            places: Sequence[TrialFlow] = start.places
             found = self.objective.minimise(x, places, most=_MOST, fixed=self.which, tolerance=_TOLERANCE)
             if found is not None:
                 if found.chi2 < self.best.chi2 - _BETTER * self.rise:

@@ -16,7 +16,7 @@ from chuteflow.checks import whole
 from chuteflow.errors import InputError
 from chuteflow.fitting.calibration import Fit
 from chuteflow.fitting.objective import Objective
-from chuteflow.fitting.residuals import Case, Place
+from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.threads import on_one_thread
 
@@ -71,7 +71,7 @@ def sample(found: Fit, *, steps: int = _STEPS, seed: int = 0) -> Posterior:
     if found.loss != "linear" or any(one.base is not None for one in found.experiments):
         raise InputError("sampling knows fits with a linear loss and known heights of the bases")
     steps = whole("steps", steps, 8, 1_000_000)
-    posterior = _Posterior.of(found)
+    posterior = _LogPosterior.of(found)
     rng = np.random.default_rng(seed)
     unknowns = posterior.objective.unknowns
     walkers = max(_WALKERS * unknowns, 8)
@@ -94,21 +94,21 @@ def sample(found: Fit, *, steps: int = _STEPS, seed: int = 0) -> Posterior:
 
 
 @dataclass(eq=False)
-class _Posterior:
+class _LogPosterior:
     """The logarithm of the posterior density; flows are followed from the fit."""
 
     objective: Objective
-    places: tuple[Place, ...]
+    places: tuple[TrialFlow, ...]
     centre: Array
     scale: float
 
     @classmethod
-    def of(cls, found: Fit) -> _Posterior:
+    def of(cls, found: Fit) -> _LogPosterior:
         """That of a fit."""
-        cases = tuple(Case.of(one, found.chute, found.free) for one in found.measured.experiments)
+        cases = tuple(TrialChute.of(one, found.chute, found.free) for one in found.measured.experiments)
         objective = Objective(cases, False, found.loss)
         places = tuple(
-            Place.of(case, one.flow, found.values) for case, one in zip(cases, found.experiments, strict=True)
+            TrialFlow.of(case, one.flow, found.values) for case, one in zip(cases, found.experiments, strict=True)
         )
         for place in places:
             # Its derivatives say how far flows move.

@@ -29,11 +29,11 @@ from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.hot import HotModel
 from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE, SCALED, VALIDITY, Quantity, Scales
-from chuteflow.steady.solver import Status
+from chuteflow.steady.solver import SolverStatus
 from chuteflow.steady.validity import WORDS
 from chuteflow.sweeps.scan import Scan
 
-_STATUS = tuple(status.name.lower() for status in Status)
+_STATUS = tuple(status.name.lower() for status in SolverStatus)
 #: Numbers of a cell of a domain: what they mean, and what their values mean, or the bits of which they are sums.
 CLASSES: dict[str, tuple[str, dict[int, str]]] = {
     "hot": (

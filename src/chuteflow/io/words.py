@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Curve, Searched
 from chuteflow.io.contract import factor
@@ -123,7 +123,7 @@ def multiplicity(curve: Curve, scales: Scales | None) -> str:
     return said
 
 
-def _fluxes(count: Count, factor: float) -> str:
+def _fluxes(count: FlowCount, factor: float) -> str:
     """The mass fluxes of a count."""
     low, high = number(count.low * factor), number(count.high * factor)
     if count.low == 0.0:

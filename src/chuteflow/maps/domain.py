@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Searched
 from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
 from chuteflow.maps.columns import Classify, Column, between, column, shares_for, to_halve
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
-from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
+from chuteflow.maps.outlines import Outline, Region, boundaries, regions
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, code, hot_code
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
 from chuteflow.result import Result
@@ -53,7 +53,7 @@ class Domain(Result):
     interface conditions, which that leaves out.
     """
 
-    plane: Plane
+    plane: ParameterPlane
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     tolerance: float
@@ -77,7 +77,7 @@ class Domain(Result):
     @classmethod
     def on_cells(
         cls,
-        plane: Plane,
+        plane: ParameterPlane,
         size: tuple[int, int],
         tolerance: float,
         columns: tuple[Column, ...],
@@ -132,7 +132,7 @@ class Domain(Result):
         return np.array(layers, dtype=bool).reshape(len(layers), len(self.y), len(self.x))
 
     @cached_property
-    def boundaries(self) -> tuple[Boundary, ...]:
+    def boundaries(self) -> tuple[Outline, ...]:
         """All boundaries between classes, as lines in the plane of the parameters."""
         return boundaries(self.plane, self.columns, self.hot_columns, self.tolerance)
 
@@ -168,8 +168,8 @@ class Domain(Result):
 @np.errstate(under="ignore")
 def domain(
     chute: Chute,
-    x: Axis | tuple[str, float, float],
-    y: Axis | tuple[str, float, float],
+    x: ParameterAxis | tuple[str, float, float],
+    y: ParameterAxis | tuple[str, float, float],
     *,
     size: tuple[int, int] = (400, 400),
     temperatures: Sequence[float] = (),
@@ -202,15 +202,15 @@ def domain(
     tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
         raise InputError(f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a share of an axis")
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     temperatures = tuple(number("temperature", t) for t in temperatures)
     for t in temperatures:
         if not within.coldest <= t <= within.hottest:
             raise InputError(
                 f"temperature {t:g}: must be in the range searched, {within.coldest:g} to {within.hottest:g}"
             )
-    x, y = (axis if isinstance(axis, Axis) else Axis(*axis) for axis in (x, y))
-    plane = Plane(x, y, chute, temperatures, within)
+    x, y = (axis if isinstance(axis, ParameterAxis) else ParameterAxis(*axis) for axis in (x, y))
+    plane = ParameterPlane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
         columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
     hot_columns = _hot_columns(plane, tolerance) if chute.surface == "free" else ()
@@ -224,7 +224,7 @@ def _pool(workers: int) -> AbstractContextManager[Executor | None]:
     return worker_pool(workers) if workers > 1 else nullcontext()
 
 
-def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
+def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
     """Columns as many as it takes, in order along the outer axis."""
     first = _FIRST_COLUMNS if tolerance < 5.0 * TOLERANCE else _FEWEST_COLUMNS
     tasks = [
@@ -253,7 +253,7 @@ def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Pr
 class _Task:
     """A column to work out."""
 
-    plane: Plane
+    plane: ParameterPlane
     place: float
     shares: Sequence[float]
     tolerance: float
@@ -263,7 +263,7 @@ def _column(task: _Task) -> Column:
     return column(task.place, partial(code, task.plane), task.shares, task.tolerance)
 
 
-def _hot_columns(plane: Plane, tolerance: float) -> list[Column]:
+def _hot_columns(plane: ParameterPlane, tolerance: float) -> list[Column]:
     """Columns of what is known in closed form, finer than the others."""
     fine = 0.1 * tolerance
     classify: Classify = partial(hot_code, plane)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -42,7 +42,7 @@ def exists_at(
     temperature = np.atleast_1d(real_array("surface_temperature", surface_temperature))
     if temperature.ndim != 1 or not temperature.size:
         raise InputError("surface temperatures must be one number or a list of them")
-    Range.checked((float(temperature.min()), 2.0 * float(temperature.max())), largest_holdup)
+    SearchRange.checked((float(temperature.min()), 2.0 * float(temperature.max())), largest_holdup)
     found = np.zeros((len(chutes), len(temperature)), dtype=bool)
     # A single trajectory has no neighbours, and is carried along with another.
     starts = np.unique(temperature) if len(np.unique(temperature)) > 1 else np.array([1.0, 2.0]) * temperature[0]

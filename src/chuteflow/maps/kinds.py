@@ -27,7 +27,7 @@ _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 
 
 @dataclass(frozen=True)
-class Kinds:
+class FlowClasses:
     """The flows of one chute in the range searched.
 
     ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
@@ -44,12 +44,12 @@ class Kinds:
     doubtful: bool
 
 
-def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> Kinds:
+def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
     """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
     of :func:`chuteflow.maps.zeros.extremes_on`."""
     lines = [line for line, _ in grid.lines if len(line) > 1]
     if not lines:
-        return Kinds((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
+        return FlowClasses((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
     zeros = zeros_on(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
     pieces, interior, density = [], 0, 0
@@ -63,7 +63,7 @@ def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) 
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
     most, least = (most_at_once(np.concatenate(stretches), _TURN) for stretches in zip(*pieces, strict=True))
     there = tuple(map(bool, at.tolist()))
-    return Kinds(there, least, len(lines), interior, density, doubtful=most != least)
+    return FlowClasses(there, least, len(lines), interior, density, doubtful=most != least)
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from chuteflow.branches.counting import most_solved
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
+from chuteflow.maps.kinds import DENSITIES, INTERIORS, FlowClasses, kinds
 from chuteflow.maps.zeros import extremes_on
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
@@ -49,7 +49,7 @@ Code = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Axis:
+class ParameterAxis:
     """A parameter from ``low`` to ``high``.
 
     Raises:
@@ -75,7 +75,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Plane:
+class ParameterPlane:
     """Two axes, and the values of all else.
 
     ``chute`` has the fixed parameters, those of the axes at a value that does not matter; ``temperatures`` are
@@ -85,11 +85,11 @@ class Plane:
         InputError: for twice the same axis, or for a corner that is no chute.
     """
 
-    x: Axis
-    y: Axis
+    x: ParameterAxis
+    y: ParameterAxis
     chute: Chute
     temperatures: tuple[float, ...]
-    within: Range = field(default_factory=lambda: Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
+    within: SearchRange = field(default_factory=lambda: SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
 
     def __post_init__(self) -> None:
         if self.x.name == self.y.name:
@@ -111,12 +111,12 @@ class Plane:
         return PARAMETERS[self.x.name].of_base and not PARAMETERS[self.y.name].of_base
 
     @property
-    def outer(self) -> Axis:
+    def outer(self) -> ParameterAxis:
         """The axis along which columns are placed."""
         return self.y if self.transposed else self.x
 
     @property
-    def inner(self) -> Axis:
+    def inner(self) -> ParameterAxis:
         """The axis along a column."""
         return self.x if self.transposed else self.y
 
@@ -126,7 +126,7 @@ class Plane:
         return self.at(v, u) if self.transposed else self.at(u, v)
 
 
-def code(plane: Plane, outer: float, inner: float) -> Code:
+def code(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     return (
@@ -138,14 +138,14 @@ def code(plane: Plane, outer: float, inner: float) -> Code:
     )
 
 
-def summary(plane: Plane, outer: float, inner: float) -> Code:
+def summary(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
     return (hot, found.most, found.families, found.interior, found.density)
 
 
-def _kinds(plane: Plane, chute: Chute) -> Kinds:
+def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
     grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
     problem = model(chute)
     found = kinds(grid.of_base(problem), extremes, plane.temperatures)
@@ -155,7 +155,7 @@ def _kinds(plane: Plane, chute: Chute) -> Kinds:
     return found if most is None else replace(found, most=most, doubtful=False)
 
 
-def hot_code(plane: Plane, outer: float, inner: float) -> Code:
+def hot_code(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """What is known in closed form of the point at shares of the outer and inner axis, by HOT_CODES.
 
     All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
@@ -176,13 +176,13 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     )
 
 
-def _neutral(plane: Plane) -> dict[str, Any]:
+def _neutral(plane: ParameterPlane) -> dict[str, Any]:
     """Values in the middle of those parameters that one grid serves all values of."""
     return {axis.name: float(axis.at(0.5)) for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
 
 
 @lru_cache(maxsize=4)
-def _grid(plane: Plane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
+def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
     """The grid of trajectories of all points of ``plane`` whose grains, with their law, and slope are those of
     ``chute``, and its extremes."""
     del registered  # known here to tell what is remembered of one law from that of another

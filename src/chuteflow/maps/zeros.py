@@ -87,7 +87,7 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     rows = grid.rows_of(ends)
     across = rows[:, 0] == rows[:, 1]
     used, back = np.unique(ends, return_inverse=True)
-    known = _Known.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
+    known = _StateValues.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
     one, two = back.reshape(ends.shape).T
 
     # Along a trajectory: Hermite's cubic in ln P.
@@ -136,7 +136,7 @@ def _at_base(grid: TrajectoryGrid, big_l: Array, y: Array, over: Array) -> tuple
 
 
 @dataclass(frozen=True, eq=False)
-class _Known:
+class _StateValues:
     """What is known at states (k,): ln M, L, y, B, ln Q, and their derivatives to ln P and from neighbour to
     neighbour."""
 
@@ -153,7 +153,7 @@ class _Known:
     flux_across: Array
 
     @classmethod
-    def at(cls, grid: TrajectoryGrid, places: Index, rows: Index) -> _Known:
+    def at(cls, grid: TrajectoryGrid, places: Index, rows: Index) -> _StateValues:
         model = grid.model
         over = grid.overburden[rows]
         p = over + model.surface_stress

@@ -38,7 +38,7 @@ def draw(data: Curves) -> Figure:
         frame(ax, right, top)
         name_slopes(ax, data, slopes, right, top)
     for density, words in (("inverted", "density inversion"), ("monotonic", "monotonic density")):
-        axes[0].plot([], [], label=words, **style.Stroke(style.BLACK, style.OF_DENSITY[density]).line())
+        axes[0].plot([], [], label=words, **style.LineStyle(style.BLACK, style.OF_DENSITY[density]).line())
     style.legend(axes[0], loc="center right")
     return figure
 

@@ -29,7 +29,7 @@ _FEW = 24
 
 
 @dataclass(frozen=True)
-class Unreached:
+class UnreachedBranch:
     """A family that the mapped method does not reach: its surface temperatures, lowest and highest, and why."""
 
     surface_temperature: tuple[float, float]
@@ -44,7 +44,7 @@ class MappedCurves:
     chute: Chute
     surface_temperature: tuple[float, float]
     branches: tuple[MappedCurve, ...]
-    unreached: tuple[Unreached, ...]
+    unreached: tuple[UnreachedBranch, ...]
 
 
 #: What figures draw.
@@ -165,7 +165,7 @@ def mapped_families(chute: Chute, surface_temperature: tuple[float, float]) -> M
             reached.append(found)
         else:
             ends = float(branch.surface_temperature.min()), float(branch.surface_temperature.max())
-            unreached.append(Unreached(ends, f"the series do not converge with up to N = {LARGEST_DEGREE}"))
+            unreached.append(UnreachedBranch(ends, f"the series do not converge with up to N = {LARGEST_DEGREE}"))
     return MappedCurves(chute, surface_temperature, tuple(reached), tuple(unreached))
 
 

@@ -54,7 +54,7 @@ def plot_comparison(found: Comparison) -> Figure:
     handles = {}
     for one in found.candidates:
         if one.condition == "M":
-            line = style.Stroke(style.stroke(closures.index(one.closure)).colour, _DASHES[one.mapping]).line()
+            line = style.LineStyle(style.stroke(closures.index(one.closure)).colour, _DASHES[one.mapping]).line()
             profile = one.flow.at_overburden(at)
             for ax, name in zip(axes[:3], _FIELDS, strict=True):
                 (drawn,) = ax.plot(getattr(profile, name), at, **line)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.maps import Boundary, Domain
+from chuteflow.maps import Domain, Outline
 from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
@@ -26,24 +26,24 @@ _DENSITIES = {0: "#ffffff", 1: "#fbe9c6", 3: "#f1c27b", 2: "#d99a5b"}
 _DENSITY_WORDS = {1: "monotonic", 3: "monotonic and inverted", 2: "inverted"}
 #: Strokes and words of the kinds of boundaries, panel by panel.
 _OF_NUMBER = {
-    "F21=0": (style.Stroke(style.BLACK, style.SOLID), r"$F_{21} = 0$: hot flows end"),
-    "lambda=3": (style.Stroke(style.VERMILION, style.SOLID), r"$\lambda = 3$: hot flows end"),
-    "delta=0": (style.Stroke(style.PURPLE, style.DASH_DOTTED), r"$\delta = 0$: hot flows end"),
-    "existence": (style.Stroke(style.BLACK, style.DASHED), "first or last flow"),
-    "multiplicity": (style.Stroke(style.BLUE, style.SOLID), "another number of flows share one flux"),
+    "F21=0": (style.LineStyle(style.BLACK, style.SOLID), r"$F_{21} = 0$: hot flows end"),
+    "lambda=3": (style.LineStyle(style.VERMILION, style.SOLID), r"$\lambda = 3$: hot flows end"),
+    "delta=0": (style.LineStyle(style.PURPLE, style.DASH_DOTTED), r"$\delta = 0$: hot flows end"),
+    "existence": (style.LineStyle(style.BLACK, style.DASHED), "first or last flow"),
+    "multiplicity": (style.LineStyle(style.BLUE, style.SOLID), "another number of flows share one flux"),
 }
 _OF_KIND = {
-    "existence": (style.Stroke(style.BLACK, style.DASHED), "first or last flow"),
-    "inverted": (style.Stroke(style.GREEN, style.SOLID), "first or last inverted density"),
-    "monotonic": (style.Stroke(style.GREEN, style.DASHED), "first or last monotonic density"),
-    "lambda=0.660": (style.Stroke(style.GREEN, style.DOTTED), r"$\lambda = 0.660$: hot flows turn inverted"),
-    "mixed": (style.Stroke(style.PURPLE, style.SOLID), "first or last mixed interior"),
-    "productive": (style.Stroke(style.PURPLE, style.DASHED), "first or last productive interior"),
-    "dissipative": (style.Stroke(style.PURPLE, style.DASH_DOTTED), "first or last dissipative interior"),
+    "existence": (style.LineStyle(style.BLACK, style.DASHED), "first or last flow"),
+    "inverted": (style.LineStyle(style.GREEN, style.SOLID), "first or last inverted density"),
+    "monotonic": (style.LineStyle(style.GREEN, style.DASHED), "first or last monotonic density"),
+    "lambda=0.660": (style.LineStyle(style.GREEN, style.DOTTED), r"$\lambda = 0.660$: hot flows turn inverted"),
+    "mixed": (style.LineStyle(style.PURPLE, style.SOLID), "first or last mixed interior"),
+    "productive": (style.LineStyle(style.PURPLE, style.DASHED), "first or last productive interior"),
+    "dissipative": (style.LineStyle(style.PURPLE, style.DASH_DOTTED), "first or last dissipative interior"),
 }
 #: Strokes of surface temperatures, in turn.
 _TEMPERATURES = tuple(
-    style.Stroke(colour, dashes)
+    style.LineStyle(colour, dashes)
     for colour, dashes in (
         (style.BLUE, style.DOTTED),
         (style.BLUE, style.DASHED),
@@ -106,7 +106,7 @@ def _kind_panel(ax: Axes, found: Domain) -> None:
     _label(ax, found, found.density, {0: "no flow"} | _DENSITY_WORDS)
 
 
-def _strokes(found: Domain) -> list[style.Stroke]:
+def _strokes(found: Domain) -> list[style.LineStyle]:
     return [_TEMPERATURES[i % len(_TEMPERATURES)] for i in range(len(found.plane.temperatures))]
 
 
@@ -134,7 +134,7 @@ def _hatch(ax: Axes, polygons: Sequence[NDArray[np.float64]]) -> None:
         )
 
 
-def _draw(ax: Axes, lines: Sequence[Boundary], strokes: dict[str, tuple[style.Stroke, str]]) -> None:
+def _draw(ax: Axes, lines: Sequence[Outline], strokes: dict[str, tuple[style.LineStyle, str]]) -> None:
     for one in lines:
         if one.kind in strokes:
             # The bounds in closed form stand above what begins or ends there.

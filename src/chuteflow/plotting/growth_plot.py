@@ -25,7 +25,7 @@ _DIGITS, _ROUNDEST, _FEW = (1, 2, 5, 3, 7, 4, 6, 8, 9), (1, 2, 5), 3
 #: Smallest distance of ticks, as a share of the axis.
 _APART = 0.08
 _MAP_OF_COLOURS = "RdBu_r"
-_NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
+_NEUTRAL = style.LineStyle(style.BLACK, style.SOLID)
 
 
 @style.own_settings()

@@ -12,7 +12,7 @@ from chuteflow.io import words
 from chuteflow.io.contract import factor
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
-from chuteflow.stability.answers import Answer
+from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _NOTHING = 1e-9
 
 
 @style.own_settings()
-def plot_modes(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
+def plot_modes(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Scales | None = None) -> Figure:
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
@@ -57,7 +57,7 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | No
     return figure
 
 
-def plot_budgets(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
+def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Scales | None = None) -> Figure:
     """The energy budget of the leading mode of each flow: bars of the terms, that add up to the growth rate."""
     from chuteflow.stability.budget import TERMS
 
@@ -84,7 +84,9 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | 
             rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total"
         )
         ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
-        ax.axvline(rate * budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
+        ax.axvline(
+            rate * budget.mode.growth, label="growth rate", **style.LineStyle(style.BLACK, style.DOTTED).line(0.9)
+        )
         ax.set_yticks(places, names)
         style.name_axes(ax, f"rate of the energy of the mode, over twice the energy{style.unit('growth', scales)}", "")
         title = f"{words.among(answer.flow, flows)}: {budget.mode.kind}, growth {rate * budget.mode.growth:.3g}"

@@ -59,14 +59,14 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class StabilityRun:
     """Neighbouring flows of a branch with one label; neighbouring runs share the flow where they meet."""
 
     label: str
     flows: tuple[Flow, ...]
 
     def __repr__(self) -> str:
-        return display.line("Run", self.label, display.counted(len(self.flows), "flow"))
+        return display.line("StabilityRun", self.label, display.counted(len(self.flows), "flow"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class MarkedBranch:
 
     branch: Branch
     samples: tuple[Sample, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[StabilityRun, ...]
     changes: tuple[Change, ...]
 
     def __repr__(self) -> str:
@@ -220,10 +220,10 @@ def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
     return Change(flow_between(branch.flows, place), place, error * per_share, neutral=True)
 
 
-def _runs(branch: Branch, label: str, breaks: Sequence[tuple[float, str]]) -> Iterator[Run]:
+def _runs(branch: Branch, label: str, breaks: Sequence[tuple[float, str]]) -> Iterator[StabilityRun]:
     """The flows of the branch cut at the positions of ``breaks``, each with the label after it."""
     begin = 0.0
     for end, after in (*breaks, (float(len(branch.flows) - 1), "")):
         inside = branch.flows[int(np.floor(begin)) + 1 : int(np.ceil(end))]
-        yield Run(label, (flow_between(branch.flows, begin), *inside, flow_between(branch.flows, end)))
+        yield StabilityRun(label, (flow_between(branch.flows, begin), *inside, flow_between(branch.flows, end)))
         begin, label = end, after

@@ -28,7 +28,7 @@ class Resolution:
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
+class BaseState:
     """A steady flow at the nodes of a grid, from far above down to the base, and d/dz there."""
 
     flow: Flow
@@ -49,13 +49,13 @@ class Base:
         return len(self.share)
 
 
-def base(flow: Flow, resolution: Resolution) -> Base:
+def base(flow: Flow, resolution: Resolution) -> BaseState:
     """``flow`` on the grid of ``resolution``; ``weights`` are those of integrals over the height."""
     g = grid(resolution.degree)
     share, rate = shares(g.nodes, resolution)
     profile = flow.at_overburden(share)
     fall = profile.volume_fraction / (flow.mass_holdup * rate)  # -ds/dz
-    return Base(
+    return BaseState(
         flow=flow,
         resolution=resolution,
         share=share,

@@ -18,14 +18,14 @@ import numpy as np
 
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
-from chuteflow.stability.base import Base, Resolution, shares
+from chuteflow.stability.base import BaseState, Resolution, shares
 from chuteflow.steady.flow import Flow
 
 #: Points of the curve for each node of a grid.
 _FINENESS = 6
 
 
-def relaxation(flow_base: Base) -> tuple[Array, Array]:
+def relaxation(flow_base: BaseState) -> tuple[Array, Array]:
     """u and -Re sigma_c on a grid several times as fine as that of ``flow_base``."""
     resolution = flow_base.resolution
     fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
@@ -45,7 +45,7 @@ def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
     return profile.velocity, nu * stiffness / viscosity
 
 
-def continuous_spectrum(flow_base: Base, kx: float) -> Complex:
+def continuous_spectrum(flow_base: BaseState, kx: float) -> Complex:
     """sigma_c(z) from far above down to the base, as points of a curve; it does not depend on ky."""
     velocity, rate = relaxation(flow_base)
     return -1j * kx * velocity - rate

@@ -37,7 +37,7 @@ from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
-from chuteflow.theory.transport import Grains, Vector, traction
+from chuteflow.theory.transport import Material, Vector, traction
 
 #: Degree of the grid in m.
 DEGREE = 40
@@ -122,7 +122,7 @@ class Layer:
                 "the interface is known for steady flows alone: time needs the free surface, give --surface free"
             )
         require_richman(flow.chute.base, "disturbed flows are")
-        Grains(flow.law, flow.chute.restitution, flow.chute.slope)
+        Material(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
         return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
 

@@ -23,7 +23,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
 from chuteflow.result import Compared
-from chuteflow.stability.base import Base, Resolution, base, shares
+from chuteflow.stability.base import BaseState, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -287,7 +287,7 @@ class Disturbances:
         velocity, rate = self._rates[resolution]
         return -1j * kx * velocity - rate
 
-    def _base(self, resolution: Resolution) -> Base:
+    def _base(self, resolution: Resolution) -> BaseState:
         return self.operator(resolution).base
 
 

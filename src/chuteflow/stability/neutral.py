@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control, Point, closes, trace
+from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, closes, trace
 from chuteflow.numerics.eigenproblem import Complex, refined
 from chuteflow.result import Compared
 from chuteflow.stability.modes import Disturbances
@@ -36,12 +36,14 @@ _ALIKE = 0.3
 #: Error of a point, in the coordinates of the plane, beyond which it is none.
 _ASTRAY = 0.02
 #: How curves are followed: arclength is measured in the coordinates of the plane.
-CONTROL = Control(initial_step=0.01, min_step=1e-5, max_step=0.04, max_angle=0.25, tolerance=1e-7, max_points=600)
+CONTROL = ContinuationSettings(
+    initial_step=0.01, min_step=1e-5, max_step=0.04, max_angle=0.25, tolerance=1e-7, max_points=600
+)
 #: Curves are one if a point of one lies this near to another.
 _SAME = 0.01
 
 
-class Plane(Protocol):
+class NeutralPlane(Protocol):
     """A rectangle of two coordinates of order one, from (0, 0) to ``size``, each point of it a flow and a wave."""
 
     @property
@@ -55,7 +57,7 @@ class Plane(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class EigenvalueGrid:
     """Leading eigenvalues sigma (m, n) at coordinates ``a`` (m,) and ``b`` (n,).
 
     NaN where no mode is seen and the continuous spectrum leads, which decays, and where ``unresolved``: there it is not
@@ -95,7 +97,9 @@ class NeutralCurve(Compared):
         return display.line("NeutralCurve", display.counted(len(self.z), "point"), f"begins at {self.ends[0]}")
 
 
-def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list[NeutralCurve]:
+def neutral_curves(
+    plane: NeutralPlane, scan: EigenvalueGrid, control: ContinuationSettings = CONTROL
+) -> list[NeutralCurve]:
     """All neutral curves that ``scan`` sees in ``plane``."""
     found: list[NeutralCurve] = []
     for line in _lines(scan):
@@ -105,7 +109,7 @@ def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list
     return found
 
 
-def _lines(scan: Scan) -> list[Array]:
+def _lines(scan: EigenvalueGrid) -> list[Array]:
     """Rough neutral curves, long ones first: contours of the scan, each (k, 2)."""
     growth = np.real(scan.sigma)
     # Where no mode is seen, the continuous spectrum leads, which decays.
@@ -119,7 +123,7 @@ def _lines(scan: Scan) -> list[Array]:
 
 
 def _entered(
-    plane: Plane, scan: Scan, line: Array, found: Sequence[NeutralCurve], control: Control
+    plane: NeutralPlane, scan: EigenvalueGrid, line: Array, found: Sequence[NeutralCurve], control: ContinuationSettings
 ) -> NeutralCurve | None:
     """The neutral curve near a rough one; None if it is among those found, or cannot be entered."""
     for share in (0.5, 0.25, 0.75, 0.1, 0.9):
@@ -140,7 +144,7 @@ def _entered(
     return None
 
 
-def _growing(scan: Scan, near: Array) -> tuple[Array, complex]:
+def _growing(scan: EigenvalueGrid, near: Array) -> tuple[Array, complex]:
     """The growing point of the scan that is nearest to ``near``, and its eigenvalue."""
     away = np.hypot(*np.meshgrid(scan.a - near[0], scan.b - near[1], indexing="ij"))
     away[~(np.real(scan.sigma) > 0.0)] = np.inf
@@ -176,11 +180,11 @@ class End(StrEnum):
 
 
 def _side(
-    plane: Plane, begin: tuple[Array, complex], start: Array, ahead: Array, control: Control
+    plane: NeutralPlane, begin: tuple[Array, complex], start: Array, ahead: Array, control: ContinuationSettings
 ) -> tuple[list[_Neutral], str]:
     """Points from ``start`` along ``ahead`` to the edge of the plane, and why they end."""
     system = _GrowthSystem(plane, *begin)
-    points: list[Point[_GrowthSystem]] = []
+    points: list[CurvePoint[_GrowthSystem]] = []
     out: list[_Neutral] = []
     path = trace(system, start, direction=ahead, control=control)
     for point in path:
@@ -199,7 +203,7 @@ def _side(
     return out, f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})"
 
 
-def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:
+def _edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
     """The coordinate that is outside the plane, and the edge that it has passed."""
     for i, end in enumerate(plane.size):
         if z[i] < 0.0:
@@ -210,7 +214,7 @@ def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:
 
 
 def _at_edge(
-    system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: Control
+    system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: ContinuationSettings
 ) -> Iterator[_Neutral]:
     """The point of the curve where coordinate ``which`` is ``edge``, if there is one to be had."""
     share = (edge - inside[which]) / (outside[which] - inside[which])
@@ -248,7 +252,7 @@ class _GrowthSystem:
     these are told from the mode by their slopes.
     """
 
-    def __init__(self, plane: Plane, begin: Array, sigma: complex) -> None:
+    def __init__(self, plane: NeutralPlane, begin: Array, sigma: complex) -> None:
         self._plane = plane
         self._sure = self._tried = self._with_slope(begin, sigma)
 

@@ -20,7 +20,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
 from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
-from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
+from chuteflow.stability.neutral import EigenvalueGrid, NeutralCurve, NeutralPlane, neutral_curves
 from chuteflow.stability.verdict import stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
@@ -46,11 +46,11 @@ class WavePlane:
 
     @property
     def size(self) -> tuple[float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         return 1.0, 1.0
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         kx, ky = np.array(self.low) + np.array(self.unit) * z
         return self.disturbances, float(kx), float(ky)
 
@@ -71,7 +71,7 @@ class FamilyPlane:
 
     @property
     def size(self) -> tuple[float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         return 1.0, 1.0
 
     def named(self, z: Array) -> Array:
@@ -83,7 +83,7 @@ class FamilyPlane:
         return self._at(place).flow
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         disturbances = self._at(float(z[1]))
         k = float(np.exp(self.low + self.unit * z[0])) / disturbances.flow.centre_of_mass
         along, across = np.cos(self.angle), np.sin(self.angle)
@@ -99,7 +99,7 @@ class FamilyPlane:
         return self._kept[place]
 
 
-def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent) -> Scan:
+def scanned(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _silent) -> EigenvalueGrid:
     """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not tell, that is marked."""
     a, b = (np.linspace(0.0, end, n) for end, n in zip(plane.size, points, strict=True))
     sigma = np.full(points, complex(np.nan, np.nan))
@@ -117,7 +117,7 @@ def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent)
                 sigma[i, j] = found[0].sigma
                 grows[i, j] = found[0].growth > max(disturbances.smallest_rate, found[0].error)
         progress((j + 1) / len(b))
-    return Scan(a, b, sigma, grows, unresolved)
+    return EigenvalueGrid(a, b, sigma, grows, unresolved)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from chuteflow.stability.modes import (
     check_wavenumbers,
     leading,
 )
-from chuteflow.stability.search import Fastest, fastest
+from chuteflow.stability.search import FastestMode, fastest
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -122,13 +122,13 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
     )
 
 
-def _single(disturbances: Disturbances, kx: float, ky: float) -> Fastest:
+def _single(disturbances: Disturbances, kx: float, ky: float) -> FastestMode:
     try:
         found = leading(disturbances, kx, ky, count=2, tolerance=TOLERANCE)
     except UnresolvedError:
-        return Fastest(None, ((kx, ky),), 1)
+        return FastestMode(None, ((kx, ky),), 1)
     # At k = 0 the mass mode says nothing of stability.
-    return Fastest(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
+    return FastestMode(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
 
 
 def wavenumbers(flow: Flow) -> tuple[float, float]:

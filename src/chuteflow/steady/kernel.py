@@ -30,7 +30,7 @@ _LONGEST, _HALVINGS = 2.0, 8
 def closures(table: Any, x: float, f: Any) -> None:
     """The closures at x and their derivatives with respect to ln x, into ``f`` (16,).
 
-    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.Table`.
+    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.FunctionTable`.
     """
     coefficients, edges = table
     degree, pieces, width = coefficients.shape

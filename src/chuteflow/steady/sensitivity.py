@@ -48,11 +48,11 @@ WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
 COORDINATES = ("height", "overburden")
 
 
-class _Moved(Flow):
+class _PerturbedFlow(Flow):
     """A flow an imaginary step along a direction of its unknowns and parameters."""
 
     @classmethod
-    def along(cls, start: Flow, beyond: Model, direction: Array) -> _Moved:
+    def along(cls, start: Flow, beyond: Model, direction: Array) -> _PerturbedFlow:
         """``start`` with the problem ``beyond`` and its unknowns a step along ``direction``."""
         problem = replace(start.solution.problem, model=beyond)
         z: Any = stepped(start.solution.z, direction)
@@ -69,7 +69,7 @@ class _Moved(Flow):
         rates = {name: derivative(values) for name, values in self._fields(share).items()}
         return {"height": derivative(self._heights(share)), **rates}
 
-    def numbers(self, start: _Start) -> dict[str, float]:
+    def numbers(self, start: _ReferenceFlow) -> dict[str, float]:
         """Derivatives of the numbers of the registry."""
         flow = start.flow
         log_q, log_h, log_m, log_t = self.place.tolist()
@@ -99,7 +99,7 @@ class _Moved(Flow):
         found["angle"] = float(derivative(np.arctan(np.complex128(self._model.slope)))) * 180.0 / np.pi
         return {name: float(found[name]) for name in NUMBERS}
 
-    def _depth(self, start: _Start, log_largest: float) -> tuple[float, float]:
+    def _depth(self, start: _ReferenceFlow, log_largest: float) -> tuple[float, float]:
         """Derivatives of the depth, and of the share of the mass above it."""
         share = np.array([start.above])
         height = float(derivative(self._heights(share)[0]))
@@ -112,7 +112,7 @@ class _Moved(Flow):
 
 
 @dataclass(frozen=True, eq=False)
-class _Start:
+class _ReferenceFlow:
     """The flow itself, and how it changes with the share of the overburden."""
 
     flow: Flow
@@ -187,7 +187,7 @@ class Sensitivity:
     at: str
     tangent: Array
     across: Array
-    _moved: tuple[_Moved, ...]
+    _moved: tuple[_PerturbedFlow, ...]
 
     def __repr__(self) -> str:
         said = ", ".join(self.keys)
@@ -233,7 +233,7 @@ class Sensitivity:
     def numbers_along(self) -> tuple[dict[str, float], dict[str, Array]]:
         """Derivatives of every number of the registry with respect to arclength along the branch, and with respect to
         each parameter (k,) across it: finite at folds."""
-        start = _Start(self.flow)
+        start = _ReferenceFlow(self.flow)
         with np.errstate(under="ignore"):
             along, *across = (moved.numbers(start) for moved in self._moved)
         return along, {name: np.array([one[name] for one in across]) for name in NUMBERS}
@@ -287,7 +287,7 @@ class Sensitivity:
         at = real_array("z", z).ravel()
         by_height = coordinate == "height"
         self.flow.profile(at) if by_height else self.flow.at_overburden(at)  # raise where there is no flow
-        start = _Start(self.flow)
+        start = _ReferenceFlow(self.flow)
         with np.errstate(under="ignore"):
             share = start.shares_at(at) if by_height else at
             found = [moved.fields(share) for moved in self._moved]
@@ -333,7 +333,7 @@ def _at_height(rates: dict[str, Array], steep: dict[str, Array]) -> dict[str, Ar
 
 def slopes_in_height(flow: Flow, z: Array) -> dict[str, Array]:
     """Derivatives of all fields of ``flow`` with respect to height, at heights ``z`` (m,) that are in the flow."""
-    start = _Start(flow)
+    start = _ReferenceFlow(flow)
     with np.errstate(under="ignore"):
         steep = start.steepness(start.shares_at(z))
     return {name: values / steep["height"] for name, values in steep.items()}
@@ -370,11 +370,11 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
     across = np.empty((4, len(free)))
-    moved = [_Moved.along(flow, problem.model, ahead)]
+    moved = [_PerturbedFlow.along(flow, problem.model, ahead)]
     for j, one in enumerate(beyond):
         rate = derivative(states[j].macroscopic()) + gradient @ found[:, 1 + j]
         direction: Array = found[:, 1 + j] - ahead * float(tangent @ rate)
-        moved.append(_Moved.along(flow, one, direction))
+        moved.append(_PerturbedFlow.along(flow, one, direction))
         across[:, j] = moved[-1].place
     return Sensitivity(flow, free, condition, tangent, across, tuple(moved))
 

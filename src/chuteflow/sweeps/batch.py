@@ -88,13 +88,13 @@ class Batch:
         nothing = np.zeros(len(self))
         return reduce(self.law, nothing, cast(Any, self.restitution), cast(Any, self.slope)).drift == 0.0
 
-    def along(self, state: Array) -> Along:
+    def along(self, state: Array) -> Pointwise:
         """Everything pointwise at states (ROWS, n)."""
-        return Along(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])
+        return Pointwise(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])
 
     def at_density(self, x: Array) -> tuple[Array, Array, Array, Array]:
         """Conduction, net loss, base flux and volume fraction at X, of the shape (..., n)."""
-        here = Along(self, np.ones_like(x), np.log(np.maximum(x, 1e-300)), np.zeros_like(x))
+        here = Pointwise(self, np.ones_like(x), np.log(np.maximum(x, 1e-300)), np.zeros_like(x))
         return here.conduction, here.net, here.base_flux, here.nu
 
     def pace(self) -> tuple[Array, Array]:
@@ -120,7 +120,7 @@ class Batch:
 _ZERO, _ONE = np.zeros(()), np.ones(())
 
 
-class Along:
+class Pointwise:
     """The closures and the balance at one point of every member, arrays of the shape of ``p``."""
 
     __slots__ = ("_base", "_batch", "_reduced", "conduction", "coupling", "ease", "log_x", "net", "nu", "p", "v", "y")

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import zeros
-from chuteflow.sweeps.aligned import Aligned
-from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Along, Batch, Indices
+from chuteflow.sweeps.aligned import AlignedArrays
+from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Batch, Indices, Pointwise
 
-Event = Callable[[Along, Indices], Array]
+Event = Callable[[Pointwise, Indices], Array]
 
 #: Members treated at once: so many that the interpreter does not count, so few that they fit the cache.
 MEMBERS = 16384
@@ -54,7 +54,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True, eq=False)
-class Ends(Aligned):
+class Ends(AlignedArrays):
     """Where members end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
     emptier, with ln X below ``thin``, p above ``settled`` and the heat flux between ``low`` and ``high``, beyond
     which no base is met. ``turn`` is p_1, and ``rate`` the fastest of y in p."""
@@ -123,7 +123,7 @@ def _span(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class EventZeros:
     """Zeros of an event in order of members, along each from the surface down: ``member`` (k,) and ``state`` (ROWS, k).
 
     ``trouble`` (n,) marks the members on which zeros may be missing: where the integration gave up, or a zero lies
@@ -153,7 +153,7 @@ def march(
     ends: Ends,
     accuracy: Accuracy,
     event: Event,
-) -> Found:
+) -> EventZeros:
     """All zeros of ``event`` on the trajectories from the surface temperatures ``temperature`` (n,).
 
     ``event`` takes the fields at one point of some members and the numbers of the members.
@@ -175,7 +175,7 @@ def march(
     member = np.concatenate([z[0] for z in zeros]) if zeros else np.empty(0, dtype=np.intp)
     state = np.concatenate([z[1] for z in zeros], axis=1) if zeros else np.empty((ROWS, 0))
     order = np.lexsort((state[LOG_P], member))
-    return Found(member[order], state[:, order], trouble)
+    return EventZeros(member[order], state[:, order], trouble)
 
 
 def _march(
@@ -226,13 +226,13 @@ def _march(
         return _located(batch, ends, steps, event)
 
 
-def _in_tau(at: Along, state: Array, turn: Array, out: Array) -> None:
+def _in_tau(at: Pointwise, state: Array, turn: Array, out: Array) -> None:
     at.derivative(state, out)
     out /= 1.0 + at.p / turn
 
 
 def _step(
-    batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Along], Array]
+    batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Pointwise], Array]
 ) -> Array:
     """One step of each member: fills the derivatives (13, ROWS, n) and events (13, n) at the stages after the first,
     and returns the states at the end."""
@@ -389,17 +389,17 @@ def _closer(
     yield which[columns], at[rows, columns], at[rows + 1, columns], values[rows, columns], values[rows + 1, columns]
 
 
-def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tuple[Array, Along]:
+def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tuple[Array, Pointwise]:
     """States (ROWS, n) a little below the free surface, or at the interface, and the fields at the very surface."""
     if batch.surface_stress:
         state = _at_interface(batch, temperature)
         return state, batch.along(state)
     p = fraction * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
-    empty = Along(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
+    empty = Pointwise(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
     return _series(batch, temperature, p, empty), empty
 
 
-def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
+def _series(batch: Batch, temperature: Array, p: Array, empty: Pointwise) -> Array:
     """The state at p by the series at the surface of the half-line, (3.23)-(3.25): y and theta to a relative p^2."""
     half = 0.5 * empty.net
     lean = half / empty.conduction
@@ -413,12 +413,12 @@ def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
         for node, weight in _GAUSS:
             inner = node * nu
             gamma += weight * nu * _coupling(batch, inner / (1.0 - inner / densest))
-        at = Along(batch, p, np.log(x), y)
+        at = Pointwise(batch, p, np.log(x), y)
         y = p * (half + (at.net - empty.net) / 3.0 - half * (at.v + at.coupling * (1.0 - at.v)) / 6.0)
         theta = np.log(temperature) + 0.5 * p**2 * lean + p * (y / at.conduction - p * lean) / 3.0
         nu = p * np.exp(-theta - gamma) / (p / (at.nu * at.temperature))
         x = nu / (1.0 - nu / densest)
-    at = Along(batch, p, np.log(x), y)
+    at = Pointwise(batch, p, np.log(x), y)
     state, derivative = np.zeros((ROWS, p.size)), np.empty((ROWS, p.size))
     state[LOG_P], state[LOG_X], state[FLUX] = np.log(p), np.log(x), y
     at.derivative(state, derivative)
@@ -432,7 +432,7 @@ def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
 
 def _coupling(batch: Batch, x: Array) -> Array:
     """g4/g3 at X."""
-    at = Along(batch, np.ones_like(x), np.log(x), np.zeros_like(x))
+    at = Pointwise(batch, np.ones_like(x), np.log(x), np.zeros_like(x))
     return at.raw_coupling
 
 
@@ -441,7 +441,7 @@ def _at_interface(batch: Batch, temperature: Array) -> Array:
     p = np.full(len(batch), batch.surface_stress)
     log_x = np.log(p / temperature)
     for _ in range(100):
-        at = Along(batch, p, log_x, np.zeros_like(p))
+        at = Pointwise(batch, p, log_x, np.zeros_like(p))
         # d ln g1/d ln X = stiffness dln nu/dln X
         move = np.clip(np.log(at.temperature / temperature) / at.stiff_x, -2.0, 2.0)
         log_x = log_x + move

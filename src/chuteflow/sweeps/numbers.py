@@ -11,7 +11,7 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.steady.flow import CUTOFF
 from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.sweeps.bases import Flows
-from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
+from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Batch, Indices, Pointwise
 from chuteflow.sweeps.judged import JUDGED_KINDS
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
 
@@ -42,7 +42,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
     out: dict[str, Array] = {name: value() for name, value in plain.items() if name in names}
     rest = set(names) - set(plain)
     if rest and flows.member.size:
-        inside = Inside(of, flows)
+        inside = InteriorQuantities(of, flows)
         further: dict[str, Callable[[], Array]] = {
             "largest_volume_fraction": lambda: inside.largest,
             "depth": lambda: inside.depth,
@@ -57,7 +57,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
     return out
 
 
-def _slip(at: Along) -> Array:
+def _slip(at: Pointwise) -> Array:
     return at.slip * np.sqrt(at.temperature)
 
 
@@ -65,7 +65,7 @@ def _mean_velocity(flows: Flows) -> Array:
     return np.exp(flows.macroscopic[LOG_Q] - flows.macroscopic[LOG_M])
 
 
-class Inside:
+class InteriorQuantities:
     """What happens between the surface and the base of flows, each on a member of its own."""
 
     def __init__(self, of: Batch, flows: Flows) -> None:
@@ -81,7 +81,7 @@ class Inside:
             np.maximum.at(largest, member, of.take(member).along(state).nu)
         self.largest: Array = largest
 
-    def _march(self, event: Callable[[Along, Indices], Array]) -> tuple[Indices, Array]:
+    def _march(self, event: Callable[[Pointwise, Indices], Array]) -> tuple[Indices, Array]:
         found = march(self._of, self._flows.temperature, self._ends, _ACCURACY, event)
         above = found.state[LOG_P] < self._flows.state[LOG_P, found.member]
         return found.member[above], found.state[:, above]

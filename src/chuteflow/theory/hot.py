@@ -164,7 +164,7 @@ def _slip(limit: Dilute, roughness: float, slope: float) -> float:
 
 
 @dataclass(frozen=True)
-class Budget:
+class HotEnergyBudget:
     """Energy lost and made, ``l`` and ``m`` tan^2 at the base (4.26), ``L`` and ``M`` tan^2 inside (4.25).
 
     L and M are for one value of lambda, which hot flows have where (m tan^2 - l)^2 = L - M tan^2 (4.27).
@@ -176,11 +176,11 @@ class Budget:
     M: float
 
 
-def budget(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> Budget:
+def budget(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> HotEnergyBudget:
     """The energy budget (4.25), (4.26) for one value of lambda, of either sign."""
     root = math.sqrt(math.pi / 2.0)
     inside = math.pi * lambda_ * limit.g30 / 3.0
-    return Budget(
+    return HotEnergyBudget(
         l=root * boundary.base_loss(wall_restitution, roughness),
         m=root * _slip(limit, roughness, 1.0),
         L=inside * limit.g52,

@@ -28,7 +28,7 @@ _EPILOG = (
 )
 
 
-class Plane(click.ParamType):
+class PlaneType(click.ParamType):
     """The second parameter and the number on the vertical axis."""
 
     name = "parameter,quantity"
@@ -52,7 +52,7 @@ class Plane(click.ParamType):
     metavar="KIND",
     help="What to follow: fold-Q (the default), fold-M, fold-T, density-inversion or interior-change.",
 )
-@options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
+@options.option("--in", "plane", type=PlaneType(), help="Second parameter and vertical axis; slope,Q by default.")
 @options.range_options("where it is the second parameter")
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options

@@ -11,7 +11,7 @@ from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from chuteflow.steady.cases import Case, Known
+    from chuteflow.steady.cases import Case, CaseNumber
 
 _EPILOG = (
     "A case stands where a chute is asked for: chuteflow solve --case paper-dissipative --flux 3. Materials say no "
@@ -47,7 +47,7 @@ def _object(one: Case) -> dict[str, Any]:
     }
 
 
-def _known(known: Known) -> dict[str, Any]:
+def _known(known: CaseNumber) -> dict[str, Any]:
     return {
         "value": known.value,
         "uncertainty": known.uncertainty,
@@ -70,13 +70,13 @@ def _list(chosen: list[Case]) -> Iterator[str]:
     yield "? guessed; chuteflow cases NAME tells how each number is known and how well"
 
 
-def _cell(known: Known) -> str:
+def _cell(known: CaseNumber) -> str:
     from chuteflow.steady.cases import GUESSED
 
     return f"{known.value:g}{'?' if known.how == GUESSED else ''}"
 
 
-def _spread(known: Known) -> str:
+def _spread(known: CaseNumber) -> str:
     return "" if known.uncertainty is None else f"+- {known.uncertainty:g}"
 
 

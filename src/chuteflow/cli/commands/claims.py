@@ -17,7 +17,7 @@ from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
-    from chuteflow.paper.claims import Verdict
+    from chuteflow.paper.claims import ClaimResult
 
 _EPILOG = (
     'Verdicts: "confirmed" as printed; "corrected" where something else holds, which is computed and backed by an '
@@ -75,7 +75,7 @@ def _chosen(only: str | None, section: str | None) -> list[str]:
     return [id for id in ids if wanted.intersection(CLAIMS[id].sections)]
 
 
-def _watched(verdicts: Iterable[Verdict], total: int) -> Iterator[Verdict]:
+def _watched(verdicts: Iterable[ClaimResult], total: int) -> Iterator[ClaimResult]:
     """The same, with the progress on standard error if that is a terminal."""
     with Progress() as progress:
         for number, verdict in enumerate(verdicts, 1):
@@ -85,7 +85,7 @@ def _watched(verdicts: Iterable[Verdict], total: int) -> Iterator[Verdict]:
                 progress.tell(f"{number} of {total} claims")
 
 
-def _json(verdicts: Sequence[Verdict]) -> str:
+def _json(verdicts: Sequence[ClaimResult]) -> str:
     from chuteflow.io import contract
 
     return contract.text([{field.name: _plain(getattr(v, field.name)) for field in fields(v)} for v in verdicts])
@@ -126,7 +126,7 @@ def _width() -> int:
     return min(max(shutil.get_terminal_size((100, 24)).columns, _NARROWEST), _WIDEST)
 
 
-def _report(verdicts: Iterable[Verdict], width: int) -> Iterator[str]:
+def _report(verdicts: Iterable[ClaimResult], width: int) -> Iterator[str]:
     from chuteflow.paper.claims import VERDICTS, shown
 
     free = width - _VERDICT_WIDTH - 3 * _GAP

@@ -208,7 +208,7 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
 def _carry_out(run: Run, processes: int) -> None:
     from chuteflow.dem.run import go_on
 
-    watch = _Watch(run)
+    watch = _SimulationProgress(run)
     try:
         for moment in go_on(run, processes):
             watch.tell(moment)
@@ -218,7 +218,7 @@ def _carry_out(run: Run, processes: int) -> None:
         watch.end()
 
 
-class _Watch:
+class _SimulationProgress:
     """Lines on standard error: what is simulated and how long the rest will take."""
 
     def __init__(self, run: Run) -> None:

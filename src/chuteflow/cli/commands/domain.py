@@ -29,39 +29,27 @@ _EPILOG = (
 )
 
 
-class Size(click.ParamType):
-    """Cells as NXxNY."""
-
-    name = "nxxny"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """Both numbers."""
-        try:
-            x, y = map(int, str(value).lower().split("x"))
-        except ValueError:
-            self.fail(f"{value!r}: write two whole numbers with an x between, for example 400x400", param, ctx)
-        return x, y
-
-
-class Numbers(click.ParamType):
-    """Numbers with commas between."""
+class NumbersInUnits(click.ParamType):
+    """Numbers separated by commas; with a unit after them as typed."""
 
     name = "numbers"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...] | options.Amounts:
+    ) -> tuple[float, ...] | options.NumbersWithUnit:
         """The numbers."""
         numbers, unit = options.without_unit(str(value))
         texts = numbers.split(",")
         found = tuple(options.Number().convert(one, param, ctx) for one in texts)
-        return options.Amounts(tuple(texts), unit, ",") if unit else found
+        return options.NumbersWithUnit(tuple(texts), unit, ",") if unit else found
 
 
 @click.command("domain", help=COMMANDS["domain"], epilog=_EPILOG)
 @options.range_options("puts it on an axis")
-@options.option("--size", type=Size(), help="Cells along x and y; 400x400 by default.")
-@options.option("--temperature", type=Numbers(), help="Surface temperatures at which to look for flows, as 1,10,100.")
+@options.option("--size", type=options.Size("NXxNY", "400x400"), help="Cells along x and y; 400x400 by default.")
+@options.option(
+    "--temperature", type=NumbersInUnits(), help="Surface temperatures at which to look for flows, as 1,10,100."
+)
 @options.option(
     "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
 )

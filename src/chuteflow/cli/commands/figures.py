@@ -16,7 +16,7 @@ from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, 
 from chuteflow.processes import available_cores
 
 
-class Numbers(click.ParamType):
+class FigureNumbers(click.ParamType):
     """Numbers of figures, separated by commas."""
 
     name = "numbers"
@@ -42,7 +42,7 @@ METHOD_HELP = "How flows are computed: overburden (this package's, the default) 
 
 
 @click.command("figures", help=COMMANDS["figures"], epilog=_EPILOG)
-@options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
+@options.option("--only", type=FigureNumbers(), help="Numbers of the figures, such as 2,3; all by default.")
 @options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
 @options.option(
     "--format",

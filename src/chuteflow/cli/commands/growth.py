@@ -26,31 +26,17 @@ _EPILOG = (
 )
 
 
-class Size(click.ParamType):
-    """Two whole numbers as MxN."""
-
-    name = "mxn"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """Both numbers."""
-        try:
-            m, n = map(int, str(value).lower().split("x"))
-        except ValueError:
-            self.fail(f"{value!r} is not a size: write two whole numbers as MxN, for example 40x40", param, ctx)
-        return m, n
-
-
 @click.command("growth", help=COMMANDS["growth"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
 @options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
 @options.option(
     "--kx",
-    type=options.Interval(units=True),
+    type=options.IntervalType(units=True),
     help="Wavenumbers along the slope; by default to three times that of the maximum.",
 )
-@options.option("--ky", type=options.Interval(units=True), help="Wavenumbers across the slope.")
-@options.option("--size", type=Size(), help="Points along kx and ky; 40x40 by default.")
+@options.option("--ky", type=options.IntervalType(units=True), help="Wavenumbers across the slope.")
+@options.option("--size", type=options.Size("MxN", "40x40"), help="Points along kx and ky; 40x40 by default.")
 @options.output_options(SAVED)
 def command(**given: Any) -> None:
     """Solve, map, print, save and draw."""

@@ -9,7 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.growth import SAVED, Size, hidden_and_unresolved
+from chuteflow.cli.commands.growth import SAVED, hidden_and_unresolved
 from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
@@ -34,10 +34,10 @@ _EPILOG = (
 @click.command("neutral", help=COMMANDS["neutral"], epilog=_EPILOG)
 @options.chute_options
 @options.option("--waves", metavar="DIRECTION", help="along (the default), across, or an angle from 0 to 90 degrees.")
-@options.option("--kh", type=options.Interval(), help="Range of k h; 0.001:1 by default.")
-@options.option("--size", type=Size(), help="Points along k h and along the family; 24x24 by default.")
+@options.option("--kh", type=options.IntervalType(), help="Range of k h; 0.001:1 by default.")
+@options.option("--size", type=options.Size("MxN", "24x24"), help="Points along k h and the family; 24x24 by default.")
 @options.option(
-    "--search-temperature", type=options.Interval(units=True), help="Surface temperatures; 0.05:50 by default."
+    "--search-temperature", type=options.IntervalType(units=True), help="Surface temperatures; 0.05:50 by default."
 )
 @options.option("--largest-holdup", type=options.NumberInUnits(), help="Largest mass hold-up searched; 30 by default.")
 @options.output_options(SAVED)

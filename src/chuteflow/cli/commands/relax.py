@@ -16,7 +16,7 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.stability.relaxation import Moment, Outcome
+    from chuteflow.stability.relaxation import Outcome, RelaxationState
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
@@ -86,7 +86,7 @@ def command(**given: Any) -> None:
     )
 
 
-def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> dict[str, Any]:
+def _content(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> dict[str, Any]:
     from chuteflow.io.contract import chute_object, factor, flow_object, units_object
     from chuteflow.steady.quantities import NUMBERS
 
@@ -106,7 +106,7 @@ def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales
     }
 
 
-def _told(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Iterator[str]:
+def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
     from chuteflow.io.contract import factor
     from chuteflow.io.tables import number, table
@@ -125,7 +125,7 @@ def _told(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | 
     yield _verdict(flow, moments[-1], end, scales)
 
 
-def _verdict(flow: Flow, last: Moment, end: Outcome, scales: Scales | None) -> str:
+def _verdict(flow: Flow, last: RelaxationState, end: Outcome, scales: Scales | None) -> str:
     from chuteflow.io.words import amount
 
     def said(name: str, value: float) -> str:
@@ -162,7 +162,7 @@ def _rows(content: dict[str, Any]) -> list[list[str]]:
     return [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
 
 
-def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Figure:
+def _plotted(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Figure:
     from chuteflow.plotting.relaxation_plot import plot_relaxation
 
     return plot_relaxation(flow, moments, end, scales=scales)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.branches.results import FlowSet
-    from chuteflow.stability.answers import Answer
-    from chuteflow.stability.budget import Budget
+    from chuteflow.stability.answers import StabilityAnswer
+    from chuteflow.stability.budget import ModeBudget
     from chuteflow.stability.modes import Mode
     from chuteflow.stability.verdict import Stability
     from chuteflow.steady.chute import Chute
@@ -100,23 +100,23 @@ def command(as_json: bool, **given: Any) -> None:
     options.deliver(given, answer, partial(_save, found, answers, scales), plotted, budget=drawn)
 
 
-def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answer:
-    from chuteflow.stability.answers import Answer
+def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> StabilityAnswer:
+    from chuteflow.stability.answers import StabilityAnswer
     from chuteflow.stability.verdict import leading_modes, stability_of
 
     try:
         stability = stability_of(flow, kx=kx, ky=ky)
     except InputError as error:
-        return Answer(flow, None, (), str(error))
+        return StabilityAnswer(flow, None, (), str(error))
     modes = () if stability.mode is None else (stability.mode,)
     if count > 1 and stability.mode is not None:
         # What leads at these wavenumbers may be unresolved, though this mode is known.
         with suppress(SolveError):
             modes = leading_modes(flow, stability.mode.kx, stability.mode.ky, count=count)
-    return Answer(flow, stability, tuple(modes), None)
+    return StabilityAnswer(flow, stability, tuple(modes), None)
 
 
-def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path: str) -> None:
+def _save(found: FlowSet, answers: Sequence[StabilityAnswer], scales: Scales | None, path: str) -> None:
     from chuteflow.io import stability_records
     from chuteflow.io.files import write_answer
 
@@ -127,7 +127,9 @@ def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path
     )
 
 
-def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scales: Scales | None) -> Iterator[str]:
+def _report(
+    found: FlowSet, answers: Sequence[StabilityAnswer], near: Sequence[str], scales: Scales | None
+) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
     yield words.chute(found.chute)
@@ -146,12 +148,12 @@ def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scal
         for i, answer in enumerate(answers, 1):
             yield f"{i}  {words.among(answer.flow, found)}: {_said(answer, scales)}"
             if answer.budget is not None:
-                yield f"   {_fed(answer.budget, _Said(found.chute, scales))}"
+                yield f"   {_fed(answer.budget, _DisturbanceFormat(found.chute, scales))}"
     yield words.searched(found.searched, found.chute, scales)
 
 
 @dataclass(frozen=True)
-class _Said:
+class _DisturbanceFormat:
     """Numbers of disturbances on a chute in words, with units where there are scales."""
 
     chute: Chute
@@ -170,7 +172,7 @@ class _Said:
         return f"{value * factor(name, self.chute, self.scales):.{digits}g}{unit}"
 
 
-def _rows(number: str, answer: Answer, columns: Sequence[str], scales: Scales | None) -> Iterator[list[str]]:
+def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: Scales | None) -> Iterator[list[str]]:
     from chuteflow.io import tables
     from chuteflow.io.contract import factor
 
@@ -187,14 +189,14 @@ def _rows(number: str, answer: Answer, columns: Sequence[str], scales: Scales | 
         yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
 
 
-def _said(answer: Answer, scales: Scales | None) -> str:
+def _said(answer: StabilityAnswer, scales: Scales | None) -> str:
     if answer.found is None:
         return f"not known: {answer.reason}"
-    found, said = answer.found, _Said(answer.flow.chute, scales)
+    found, said = answer.found, _DisturbanceFormat(answer.flow.chute, scales)
     return _of_all(found, said) if found.complete else _of_some(found, said)
 
 
-def _fed(budget: Budget, said: _Said) -> str:
+def _fed(budget: ModeBudget, said: _DisturbanceFormat) -> str:
     """What feeds a mode and what it loses most by, of its energy budget."""
     terms = sorted(budget.terms, key=lambda term: -term.total)
     told = ", ".join(f"{term.name} {said('growth', term.total)}" for term in (*terms[:2], *terms[-2:]))
@@ -202,7 +204,7 @@ def _fed(budget: Budget, said: _Said) -> str:
     return f"energy of the mode: {told}, of a growth rate of {growth}; closes to {abs(budget.closure):.0e}"
 
 
-def _of_all(found: Stability, told: _Said) -> str:
+def _of_all(found: Stability, told: _DisturbanceFormat) -> str:
     """The verdict after all of the range was searched, and what stayed unresolved."""
     from chuteflow.io.stability_records import why_unknown
 
@@ -224,7 +226,7 @@ def _of_all(found: Stability, told: _Said) -> str:
     return f"stable: nothing grows faster than {rate} for wavenumbers from {least} to {most}; {slowest}"
 
 
-def _of_some(found: Stability, told: _Said) -> str:
+def _of_some(found: Stability, told: _DisturbanceFormat) -> str:
     """What the wave does that was asked about, or the fastest of those that were."""
     rest = "; whether the flow is stable is not known from this: give neither --kx nor --ky"
     mode = found.mode
@@ -240,7 +242,7 @@ def _of_some(found: Stability, told: _Said) -> str:
     return f"{_wave(mode, told)} neither grows nor decays faster than {rate}{rest}"
 
 
-def _places(found: Stability, told: _Said) -> str:
+def _places(found: Stability, told: _DisturbanceFormat) -> str:
     """The unresolved wavenumbers, the first few of them."""
     some = ", ".join(
         " and ".join(f"{name} = {told.rounded('wavenumber', k, 3)}" for name, k in (("kx", kx), ("ky", ky)))
@@ -250,7 +252,7 @@ def _places(found: Stability, told: _Said) -> str:
     return f"{some} and {more} more" if more > 0 else some
 
 
-def _wave(mode: Mode, told: _Said) -> str:
+def _wave(mode: Mode, told: _DisturbanceFormat) -> str:
     import math
 
     if mode.direction == "uniform":

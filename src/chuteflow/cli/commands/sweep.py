@@ -133,11 +133,11 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
 
     try:
         with store.held(alone=alone):
-            found = _Found(store, chunks, check=check)
+            found = _CheckedChunks(store, chunks, check=check)
             for line in found.damage_lines():
                 click.echo(f"{line}: computed again", err=True)
             _begin(store, found, computing=len(found.sound) < len(chunks))
-            progress = Watch(len(chunks), len(found.sound))
+            progress = SweepProgress(len(chunks), len(found.sound))
             for marker in run(store, (chunk for chunk in chunks if chunk not in found.sound), workers):
                 progress.add(marker)
                 found.add(marker)
@@ -145,11 +145,11 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"stopped; to go on: chuteflow {shlex.join(sys.argv[1:])}") from None
     # Of the chunks that were not asked for, the markers have to do.
-    others = _Found(store, [chunk for chunk in store.done() if chunk not in found.sound], check=False)
+    others = _CheckedChunks(store, [chunk for chunk in store.done() if chunk not in found.sound], check=False)
     click.echo("\n".join(_totals(store, found.totals + others.totals)))
 
 
-def _begin(store: Store, found: _Found, *, computing: bool) -> None:
+def _begin(store: Store, found: _CheckedChunks, *, computing: bool) -> None:
     """Put the metadata in order, and say what has to be known of the store before chunks are added."""
     from chuteflow.sweeps.store import StoreError
 
@@ -168,7 +168,7 @@ def _begin(store: Store, found: _Found, *, computing: bool) -> None:
 
 
 @dataclass
-class Totals:
+class ChunkTotals:
     """Sums over chunks, and how many chunks each version of the program computed."""
 
     chunks: int = 0
@@ -187,12 +187,12 @@ class Totals:
         self.singly += marker.singly
         self.versions[marker.version] += 1
 
-    def __add__(self, other: Totals) -> Totals:
+    def __add__(self, other: ChunkTotals) -> ChunkTotals:
         sums = {one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
-        return Totals(**sums)
+        return ChunkTotals(**sums)
 
 
-class _Found:
+class _CheckedChunks:
     """What is found in a store of some chunks: which are sound, and what is wrong with the others."""
 
     def __init__(self, store: Store, chunks: Sequence[int], *, check: bool) -> None:
@@ -202,7 +202,7 @@ class _Found:
         self.damage: dict[int, str] = {}
         self.failures: list[tuple[int, str]] = []
         self.unchecked = 0
-        self.totals = Totals()
+        self.totals = ChunkTotals()
         wanted = chunks if isinstance(chunks, range) else frozenset(chunks)
         for chunk in sorted(store.done()):
             if chunk in wanted:
@@ -226,7 +226,7 @@ class _Found:
             yield f"{len(self.damage) - _MOST_LINES} more chunks are damaged"
 
 
-class Watch:
+class SweepProgress:
     """Lines on standard error: what is done and how long the rest will take."""
 
     def __init__(self, whole: int, done: int) -> None:
@@ -297,7 +297,7 @@ def _seconds(study: Study, points: int) -> float:
 
 
 def _status(store: Store, *, check: bool) -> Iterator[str]:
-    found = _Found(store, range(store.study.chunks), check=check)
+    found = _CheckedChunks(store, range(store.study.chunks), check=check)
     yield from _totals(store, found.totals)
     if not check:
         yield "the arrays have not been checked"
@@ -312,7 +312,7 @@ def _status(store: Store, *, check: bool) -> Iterator[str]:
         yield f"point {point}: {why}"
 
 
-def _totals(store: Store, totals: Totals) -> Iterator[str]:
+def _totals(store: Store, totals: ChunkTotals) -> Iterator[str]:
     yield (
         f"{store.path}: {totals.chunks} of {store.study.chunks} chunks, {totals.points} points, "
         f"{totals.flows} flows, {totals.failed} points failed, {totals.singly} points solved one by one"

@@ -8,7 +8,7 @@ from chuteflow import Chute, Flow, Stability, flows, stability_of
 from chuteflow.paper.claims.registry import Finding, claim, decide
 from chuteflow.paper.claims.shared import SLOPE, named_flows
 from chuteflow.paper.materials import dissipative
-from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.budget import ModeBudget, energy_budget
 
 #: Surface temperatures of the family of figure 3 that stand for it beside flows A and C, hot to cold.
 _WARMTH = (20.0, 1.7, 1.2, 0.5)
@@ -113,7 +113,7 @@ def inversion_and_stability() -> Finding:
 
 
 @cache
-def _budgets() -> dict[str, Budget]:
+def _budgets() -> dict[str, ModeBudget]:
     """Energy budgets of the fastest modes: of one of each kind, and of two where something else may feed it."""
     judged = _judged()
     chute, temperature = _STEEP_ALONG
@@ -129,7 +129,7 @@ def _budgets() -> dict[str, Budget]:
     return {name: energy_budget(found.mode) for name, found in fastest.items() if found.mode is not None}
 
 
-def _source(budget: Budget) -> tuple[str, float]:
+def _source(budget: ModeBudget) -> tuple[str, float]:
     """What feeds a mode most: the collisional loss, both of its parts together, or another term, and its rate."""
     rates = {term.name: term.total for term in budget.terms if term.name not in _LOSS}
     rates["collisional loss"] = budget.rate(*_LOSS)

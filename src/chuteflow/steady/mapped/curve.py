@@ -14,14 +14,16 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control, Monitor, Point, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, Monitor, locate, trace
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.mapped.solution import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
-from chuteflow.steady.solver import Condition, Status
+from chuteflow.steady.solver import Condition, SolverStatus
 
 #: How a curve is followed; lengths are in the plane (ln S, ln Q). Points are solved again more closely.
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600)
+CONTROL = ContinuationSettings(
+    initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600
+)
 #: Range of T_surface followed unless another is asked for: few chutes are within reach of N = 400 below it.
 SURFACE_TEMPERATURE = (0.05, 100.0)
 #: Estimated relative error of Q, h and M up to which a flow is taken for one.
@@ -80,7 +82,7 @@ class MappedCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class _Side:
+class _MappedSide:
     """What is met on one side of the start, kinds (empty for a plain flow) with flows, and why the side ends."""
 
     met: list[tuple[str, MappedSolution]]
@@ -91,7 +93,7 @@ def mapped_curve(
     start: Flow | MappedSolution,
     *,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
 ) -> MappedCurve:
     """The family through ``start``, to both sides, as far as it goes in a range of T_surface.
 
@@ -129,7 +131,7 @@ def _special(met: Sequence[tuple[str, MappedSolution]]) -> Iterator[MappedPoint]
             before += 1
 
 
-def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: Control) -> _Side:
+def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: ContinuationSettings) -> _MappedSide:
     """From ``first`` on, towards larger (1) or smaller (-1) S."""
     degree = min(d for d in DEGREES if d >= min(first.degree, LARGEST_DEGREE))
     system, matrix = first.system.transferred(degree, first.system.multiple)
@@ -148,17 +150,17 @@ def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], 
                 flow = _as_flow(point)
                 end = _unresolved(flow)
                 if end:
-                    return _Side(met, end)
+                    return _MappedSide(met, end)
                 met.append(("", flow))
                 end = _outside(flow, bounds)
                 if end:
-                    return _Side(met, end)
+                    return _MappedSide(met, end)
         previous = point
-    return _Side(met, path.status.value)
+    return _MappedSide(met, path.status.value)
 
 
 def _between(
-    previous: Point[MappedSystem], point: Point[MappedSystem], control: Control
+    previous: CurvePoint[MappedSystem], point: CurvePoint[MappedSystem], control: ContinuationSettings
 ) -> Iterator[tuple[str, MappedSolution]]:
     """Kinds and flows of the special points of a step, as far as they are resolved."""
     for kind, monitor in _MONITORS.items():
@@ -188,7 +190,7 @@ _MONITORS: dict[str, Monitor[MappedSystem]] = {"fold-Q": _flux_slope, "density-i
 def _unresolved(flow: MappedSolution) -> str:
     """Why ``flow`` is not taken for one; empty where it is."""
     if not np.isfinite(flow.error):
-        return Status.NO_CONVERGENCE.value
+        return SolverStatus.NO_CONVERGENCE.value
     return "" if flow.error <= TOLERANCE else f"the series are not resolved with N = {LARGEST_DEGREE}"
 
 
@@ -201,7 +203,7 @@ def _outside(flow: MappedSolution, bounds: tuple[float, float]) -> str:
     return ""
 
 
-def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
+def _as_flow(point: CurvePoint[MappedSystem]) -> MappedSolution:
     """A point of a trace as a flow with its estimated error: solved again in a plane across the curve."""
     system = point.system
     _, _, macroscopic, gradient = system.evaluate(point.z)
@@ -209,7 +211,7 @@ def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
     along[LOG_H] = 0.0
     along /= np.linalg.norm(along)
     plane = Condition((along[LOG_Q], 0.0, along[LOG_M], along[LOG_T]), float(along @ macroscopic))
-    near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, Status.CONVERGED, point.iterations)
+    near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, SolverStatus.CONVERGED, point.iterations)
     flow = solve_mapped(system.chute, near, plane, system.degree, multiple=system.multiple)
     if flow.error <= TOLERANCE or system.degree == LARGEST_DEGREE:
         return flow

@@ -54,7 +54,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.kinds import density_kind
-from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Condition, SolverStatus, checked_tolerance
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
@@ -136,7 +136,7 @@ def sampling(degree: int) -> Sampling:
 
 
 @dataclass(frozen=True, eq=False)
-class Local:
+class PointValues:
     """Functions of the fields at single points, arrays of one shape, with the scale S taken out.
 
     ``nu`` volume fraction; ``momentum`` residual of (3.8); ``flux`` phi, and ``conduction`` its part along the
@@ -228,7 +228,7 @@ class MappedSystem:
         """ln (Q, h, M, T_surface) (4,) of the fields: (3.26) and (3.27) by quadrature in zeta."""
         return self.evaluate(z)[2]
 
-    def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> Local:
+    def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> PointValues:
         """Functions of the fields at points; arguments may be complex, for derivatives."""
         chute, chosen = self.chute, self.chute.law
         s, kappa = chute.slope, self.kappa
@@ -250,7 +250,7 @@ class MappedSystem:
             surface = (stress - boundary.INTERFACE_STRESS, flux - surface_flux * stress * y)
         else:
             surface = (y - 1.0,)
-        return Local(
+        return PointValues(
             nu=nu,
             momentum=2.0 / kappa * omega * (g1_slope * y2 * dx + big_g * x * y * dy) - x,
             flux=flux,
@@ -439,13 +439,13 @@ class MappedSolution:
     macroscopic: Array
     error: float
     residual: float
-    status: Status
+    status: SolverStatus
     iterations: int
 
     @property
     def converged(self) -> bool:
         """Whether Newton's method converged, and to the tolerance where one was given."""
-        return self.status is Status.CONVERGED
+        return self.status is SolverStatus.CONVERGED
 
     @property
     def chute(self) -> Chute:
@@ -544,7 +544,7 @@ class MappedSolution:
             dissipation=at.dissipation * at.nu**2 * (root * y) ** 3,
         )
 
-    def _local(self, zeta: Array) -> Local:
+    def _local(self, zeta: Array) -> PointValues:
         a, b, log_scale, _ = self.system.split(self.z)
         x, dx, y, dy = (_series(c, zeta, order) for c in (a, b) for order in (0, 1))
         return self.system.local(x, dx, y, dy, np.asarray(log_scale), self.system.omega(zeta))
@@ -625,7 +625,7 @@ def refine(
             return replace(found, iterations=iterations)
         growth = 1.5
         if found.converged:
-            found = replace(found, status=Status.UNRESOLVED)
+            found = replace(found, status=SolverStatus.UNRESOLVED)
             z = smaller.transferred(largest_degree, system.multiple)[1] @ found.z
             # The error falls by the same factor with each coefficient more.
             growth = float(np.clip(np.log(0.1 * tolerance) / np.log(min(found.error, 0.1)), 1.1, 2.0))
@@ -688,7 +688,9 @@ def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolut
     result = newton(lambda z: step(system, z)[:2], z, tolerance=1e-9, longest_step=1.0)
     z = result.z
     if not (result.converged and _is_physical(system, z)):
-        return MappedSolution(system, z, np.full(4, np.nan), np.inf, np.inf, Status.NO_CONVERGENCE, result.iterations)
+        return MappedSolution(
+            system, z, np.full(4, np.nan), np.inf, np.inf, SolverStatus.NO_CONVERGENCE, result.iterations
+        )
     macroscopic = system.macroscopic(z)
     larger, matrix = system.transferred(int(np.ceil(_CHECK * system.degree)), system.multiple)
     residual, jacobian, near, gradient = step(larger, matrix @ z)
@@ -700,9 +702,9 @@ def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolut
     a, b, _, _ = system.split(z)
     error = max(_SAFETY * (change + max(_decay(a), _decay(b))), _FLOOR)
     between = system.residual_between_nodes(z)
-    status = Status.CONVERGED
+    status = SolverStatus.CONVERGED
     if not (np.isfinite(error) and between < _SPURIOUS):
-        error, status = np.inf, Status.UNRESOLVED
+        error, status = np.inf, SolverStatus.UNRESOLVED
     return MappedSolution(system, z, macroscopic, error, between, status, result.iterations + 1)
 
 
