@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, locate, trace
+from chuteflow.numerics.following import Event, Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.elements import DEGREES
 
@@ -40,15 +41,6 @@ _BLUNT = 1e-6
 _NO_RATE = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryTurn:
-    """A turning point in the second parameter: its ``kind``, one of TURNS, and the index of the point before it."""
-
-    kind: str
-    point: BoundaryPoint
-    position: int
-
-
 #: Kinds of turning points, and what they are.
 TURNS = {
     "cusp": "two folds meet: three flows become one",
@@ -64,7 +56,7 @@ class TracedBoundary:
 
     sweep: SecondParameter
     points: tuple[BoundaryPoint, ...]
-    turns: tuple[BoundaryTurn, ...]
+    turns: tuple[Event[BoundaryPoint], ...]
     ends: tuple[str, str]
 
     def holds(self, point: BoundaryPoint) -> bool:
@@ -119,16 +111,6 @@ class TracedBoundary:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)
 
 
-@dataclass(eq=False)
-class _Side:
-    """What one side of a boundary is made of, from the start outwards."""
-
-    points: list[BoundaryPoint] = field(default_factory=list)
-    turns: list[BoundaryTurn] = field(default_factory=list)
-    end: str = ""
-    closed: bool = False
-
-
 def traced(
     start: BoundaryPoint,
     within: SearchRange,
@@ -142,17 +124,8 @@ def traced(
         SolveError: where the start could not be carried on.
     """
     tangent = start.system.tangent(start.w)
-    sweep = start.system.sweep
-    onward = _side(start, tangent, within, tolerance, control, notice)
-    if onward.closed:
-        points = (*onward.points, onward.points[0])
-        return TracedBoundary(sweep, points, tuple(onward.turns), (onward.end, onward.end))
-    back = _side(start, -tangent, within, tolerance, control, notice)
-    last = len(back.points) - 1
-    turns = [BoundaryTurn(t.kind, t.point, last - 1 - t.position) for t in reversed(back.turns)]
-    turns += [BoundaryTurn(t.kind, t.point, last + t.position) for t in onward.turns]
-    points = (*back.points[:0:-1], *onward.points)
-    return TracedBoundary(sweep, points, tuple(turns), (back.end, onward.end))
+    found = follow_both_sides(lambda sign: _side(start, sign * tangent, within, tolerance, control, notice))
+    return TracedBoundary(start.system.sweep, found.points, found.events, found.ends)
 
 
 def _side(
@@ -162,60 +135,63 @@ def _side(
     tolerance: float,
     control: ContinuationSettings,
     notice: Callable[[], object],
-) -> _Side:
-    side = _Side([start])
+) -> Side[BoundaryPoint]:
     system = start.system
     path = trace(system, start.w, direction=system.weights * tangent, control=control)
-    first = before = next(path, None)
-    for point in path:
+    first: list[CurvePoint[BoundarySystem]] = []
+
+    def extend(
+        side: Side[BoundaryPoint], before: CurvePoint[BoundarySystem] | None, point: CurvePoint[BoundarySystem]
+    ) -> None:
+        if before is None:
+            first.append(point)
+            return
         notice()
-        if point.step == 0.0 or first is None or before is None:
-            before = point  # the same point on another grid, or with other borders
-            continue
+        if point.step == 0.0:
+            return  # the same point on another grid, or with other borders
         try:
-            ended = _extended(side, first, before, point, within, tolerance)
+            _extend(side, first[0], before, point, within, tolerance)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
-            side.end, ended = "it is lost in rounding a little further on", True
-        if ended:
-            return side
-        before = point
-    corner = path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange)
-    side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
+            side.stop("it is lost in rounding a little further on")
+
+    side = follow_side(path, Side(start), extend)
+    if path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange):
+        side.stop("the change goes over to another place in the flow, at a corner")
     return side
 
 
-def _extended(
-    side: _Side,
+def _extend(
+    side: Side[BoundaryPoint],
     first: CurvePoint[BoundarySystem],
     before: CurvePoint[BoundarySystem],
     point: CurvePoint[BoundarySystem],
     within: SearchRange,
     tolerance: float,
-) -> bool:
-    """Add what a step leads to, and tell whether the side ends there.
+) -> None:
+    """Add what a step leads to, and stop the side where it leaves the range or closes.
 
     Raises:
         SolveError: where a point or turning point could not be solved to ``tolerance``.
     """
     edge = left(before, point, within, tolerance)
     if edge is not None:
-        reached, side.end = edge
+        reached, end = edge
         if reached is not None:
-            _note_turn(side, before, point, tolerance, reached)
-            side.points.append(reached)
-        return True
-    _note_turn(side, before, point, tolerance)
+            _add_turn(side, before, point, tolerance, reached)
+            side.add(reached)
+        side.stop(end)
+        return
+    _add_turn(side, before, point, tolerance)
     if len(side.points) > 3 and _returned(first, before, point):
-        side.end, side.closed = "the boundary closes on itself", True
-        return True
+        side.stop("the boundary closes on itself", closed=True)
+        return
     row = (point.system.weights * point.tangent)[-3:]
-    side.points.append(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
-    return False
+    side.add(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
 
 
-def _note_turn(
-    side: _Side,
+def _add_turn(
+    side: Side[BoundaryPoint],
     before: CurvePoint[BoundarySystem],
     point: CurvePoint[BoundarySystem],
     tolerance: float,
@@ -231,7 +207,7 @@ def _note_turn(
         row = before.system.weights[-3:] * (point.z - before.z)[-3:]
         if row @ turn.w[-3:] > row @ last.w[-3:]:
             return
-    side.turns.append(BoundaryTurn(_kind(turn), turn, len(side.points) - 1))
+    side.add(turn, _kind(turn))
 
 
 def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], tolerance: float) -> BoundaryPoint:

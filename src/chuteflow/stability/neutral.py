@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, closes, trace
+from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, closes, trace
 from chuteflow.numerics.eigenproblem import Complex, refined
+from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.result import Compared
 from chuteflow.stability.modes import Disturbances
 
@@ -133,15 +134,26 @@ def _entered(
             continue
         if any(np.hypot(*(curve.z - line[i]).T).min() < _SAME for curve in found):
             return None
-        begin, sigma = _growing(scan, line[i])
-        onward, end = _side(plane, (begin, sigma), line[i], along, control)
-        if len(onward) < 2:
-            continue
-        if end is End.CLOSED:
-            return _curve([*onward, onward[0]], (end, end))
-        back, start = _side(plane, (begin, sigma), line[i], -along, control)
-        return _curve([*back[:0:-1], *onward], (start, end))
+        curve = _through(plane, _growing(scan, line[i]), line[i], along, control)
+        if curve is not None:
+            return curve
     return None
+
+
+def _through(
+    plane: NeutralPlane, begin: tuple[Array, complex], start: Array, along: Array, control: ContinuationSettings
+) -> NeutralCurve | None:
+    """The neutral curve near ``start``, of the mode that grows at ``begin``; None if it has no second point there."""
+    onward = _side(plane, begin, start, along, control)
+    if len(onward.points) < 2:
+        return None
+    found = follow_both_sides(lambda sign: onward if sign > 0.0 else _side(plane, begin, start, -along, control))
+    return NeutralCurve(
+        z=np.array([point.z for point in found.points]),
+        frequency=np.array([-point.sigma.imag for point in found.points]),
+        error=np.array([point.error for point in found.points]),
+        ends=found.ends,
+    )
 
 
 def _growing(scan: EigenvalueGrid, near: Array) -> tuple[Array, complex]:
@@ -161,15 +173,6 @@ class _Neutral:
     error: float
 
 
-def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
-    return NeutralCurve(
-        z=np.array([point.z for point in points]),
-        frequency=np.array([-point.sigma.imag for point in points]),
-        error=np.array([point.error for point in points]),
-        ends=ends,
-    )
-
-
 class End(StrEnum):
     """Where a neutral curve ends, as is said of it; one that is lost names the reason beside LOST."""
 
@@ -181,26 +184,36 @@ class End(StrEnum):
 
 def _side(
     plane: NeutralPlane, begin: tuple[Array, complex], start: Array, ahead: Array, control: ContinuationSettings
-) -> tuple[list[_Neutral], str]:
-    """Points from ``start`` along ``ahead`` to the edge of the plane, and why they end."""
+) -> Side[_Neutral]:
+    """The side from ``start`` along ``ahead``, at most to the edge of the plane."""
     system = _GrowthSystem(plane, *begin)
-    points: list[CurvePoint[_GrowthSystem]] = []
-    out: list[_Neutral] = []
     path = trace(system, start, direction=ahead, control=control)
-    for point in path:
+    points: list[CurvePoint[_GrowthSystem]] = []
+
+    def extend(
+        side: Side[_Neutral], previous: CurvePoint[_GrowthSystem] | None, point: CurvePoint[_GrowthSystem]
+    ) -> None:
         edge = _edge_passed(plane, point.z)
         if edge is not None:
-            if out:
-                out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
-            return out, End.EDGE
-        judged = system.judged(point.z)
-        if judged.error > _ASTRAY:
-            return out, End.CONTINUOUS
+            if previous is not None:
+                for last in _at_edge(system, previous.z, point.z, *edge, control):
+                    side.add(last)
+            side.stop(End.EDGE)
+            return
+        neutral = system.followed_to(point.z)
+        if neutral.error > _ASTRAY:
+            side.stop(End.CONTINUOUS)
+            return
         points.append(point)
-        out.append(judged)
         if len(points) > 3 and closes(points[0], points[-2], points[-1]):
-            return out[:-1], End.CLOSED
-    return out, f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})"
+            side.stop(End.CLOSED, closed=True)
+            return
+        side.add(neutral)
+
+    side = follow_side(path, Side(), extend)
+    if path.status is not ContinuationStatus.RUNNING:
+        side.stop(f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})")
+    return side
 
 
 def _edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
@@ -221,9 +234,9 @@ def _at_edge(
     direction = np.eye(2)[which]
     for point in trace(system, inside + share * (outside - inside), direction=direction, control=control):
         z = np.where(direction > 0.0, edge, point.z)
-        judged = system.judged(z)
-        if judged.error <= _ASTRAY:
-            yield judged
+        neutral = system.followed_to(z)
+        if neutral.error <= _ASTRAY:
+            yield neutral
         return
 
 
@@ -268,7 +281,7 @@ class _GrowthSystem:
             self._tried = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
 
-    def judged(self, z: Array) -> _Neutral:
+    def followed_to(self, z: Array) -> _Neutral:
         """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""
         self._sure = self._tried = there = self._followed(z)
         growth = self._sigma(z, there.sigma, _JUDGE).real - there.sigma.real

@@ -7,7 +7,7 @@ two flows of one mass flux meet (section 3.5), is where d ln Q along the unit ta
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, Monitor, locate, trace
+from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.mapped.solution import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
@@ -81,14 +82,6 @@ class MappedCurve:
         return np.array([flow.surface_temperature for flow in self.flows])
 
 
-@dataclass(frozen=True, eq=False)
-class _MappedSide:
-    """What is met on one side of the start, kinds (empty for a plain flow) with flows, and why the side ends."""
-
-    met: list[tuple[str, MappedSolution]]
-    end: str
-
-
 def mapped_curve(
     start: Flow | MappedSolution,
     *,
@@ -116,47 +109,44 @@ def mapped_curve(
     if not first.converged:
         return MappedCurve((), (), (first.status.value, first.status.value))
     bounds = (float(np.log(low)), float(np.log(high)))
-    hot, cold = (_side(first, direction, bounds, control) for direction in (1.0, -1.0))
-    met = [*hot.met[::-1], ("", first), *cold.met]
-    flows = tuple(flow for kind, flow in met if not kind)
-    return MappedCurve(flows, tuple(_special(met)), (hot.end, cold.end))
+    # The curve runs from hot to cold.
+    found = follow_both_sides(lambda sign: _side(first, -sign, bounds, control))
+    special = tuple(MappedPoint(event.kind, event.point, event.position) for event in found.events)
+    return MappedCurve(found.points, special, found.ends)
 
 
-def _special(met: Sequence[tuple[str, MappedSolution]]) -> Iterator[MappedPoint]:
-    before = -1
-    for kind, flow in met:
-        if kind:
-            yield MappedPoint(kind, flow, before)
-        else:
-            before += 1
-
-
-def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: ContinuationSettings) -> _MappedSide:
+def _side(
+    first: MappedSolution, direction: float, bounds: tuple[float, float], control: ContinuationSettings
+) -> Side[MappedSolution]:
     """From ``first`` on, towards larger (1) or smaller (-1) S."""
     degree = min(d for d in DEGREES if d >= min(first.degree, LARGEST_DEGREE))
     system, matrix = first.system.transferred(degree, first.system.multiple)
     z = matrix @ first.z
     ahead = np.zeros(len(z))
     ahead[-2] = direction
-    path = trace(system, z, direction=ahead, control=control)
-    met: list[tuple[str, MappedSolution]] = []
-    taken, previous = 0.0, None
-    for point in path:
-        if previous is not None and point.step > 0.0:
-            special = list(_between(previous, point, control))
-            met += special
-            if special or point.arclength > taken + _SPACING:
-                taken = point.arclength
-                flow = _as_flow(point)
-                end = _unresolved(flow)
-                if end:
-                    return _MappedSide(met, end)
-                met.append(("", flow))
-                end = _outside(flow, bounds)
-                if end:
-                    return _MappedSide(met, end)
-        previous = point
-    return _MappedSide(met, path.status.value)
+    reached = 0.0
+
+    def extend(
+        side: Side[MappedSolution], previous: CurvePoint[MappedSystem] | None, point: CurvePoint[MappedSystem]
+    ) -> None:
+        nonlocal reached
+        if previous is None or point.step == 0.0:
+            return
+        special = list(_between(previous, point, control))
+        for kind, flow in special:
+            side.add(flow, kind)
+        if not special and point.arclength <= reached + _SPACING:
+            return
+        reached = point.arclength
+        flow = _as_flow(point)
+        end = _unresolved(flow)
+        if not end:
+            side.add(flow)
+            end = _outside(flow, bounds)
+        if end:
+            side.stop(end)
+
+    return follow_side(trace(system, z, direction=ahead, control=control), Side(first), extend)
 
 
 def _between(
