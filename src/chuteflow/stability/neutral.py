@@ -30,8 +30,8 @@ from chuteflow.stability.modes import Disturbances
 
 #: Steps of the central differences that give the slope of sigma: Newton's method does with few digits of it.
 _STEP = 1e-4
-#: The grids on which curves are followed, and on which their points are judged.
-_LEVEL, _JUDGE = 1, 2
+#: The grids on which curves are followed, and on which the errors of their points are estimated.
+_LEVEL, _FINEST = 1, 2
 #: A mode changes with the coordinates as at the point before, by this share of the larger square of both slopes.
 _ALIKE = 0.3
 #: Error of a point, in the coordinates of the plane, beyond which it is none.
@@ -261,13 +261,14 @@ class _Eigenvalue:
 class _GrowthSystem:
     """Re sigma(z) = 0 for the mode that is ``sigma`` at ``begin``, followed from one point to the next.
 
-    A real rate that vanishes does so at the end of the continuous spectrum, of which a grid has points close below:
-    these are told from the mode by their slopes.
+    The mode at z is the one nearest to what is extrapolated from the last accepted point or the last trial of Newton's
+    method, whichever is nearer. A real rate that vanishes does so at the end of the continuous spectrum, of which a
+    grid has points close below. Trials that lead to these are recognised by their slopes, and not extrapolated from.
     """
 
     def __init__(self, plane: NeutralPlane, begin: Array, sigma: complex) -> None:
         self._plane = plane
-        self._sure = self._tried = self._with_slope(begin, sigma)
+        self._accepted = self._trial = self._with_slope(begin, sigma)
 
     @property
     def weights(self) -> Array:
@@ -277,19 +278,19 @@ class _GrowthSystem:
     def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""
         there = self._followed(z)
-        if self._sure.same_mode(there):
-            self._tried = there
+        if self._accepted.same_mode(there):
+            self._trial = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
 
     def followed_to(self, z: Array) -> _Neutral:
         """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""
-        self._sure = self._tried = there = self._followed(z)
-        growth = self._sigma(z, there.sigma, _JUDGE).real - there.sigma.real
+        self._accepted = self._trial = there = self._followed(z)
+        growth = self._sigma(z, there.sigma, _FINEST).real - there.sigma.real
         steepness = float(np.hypot(*np.real(there.slope)))
         return _Neutral(z, there.sigma, abs(growth) / steepness if steepness > 0.0 else np.inf)
 
     def _followed(self, z: Array) -> _Eigenvalue:
-        nearest = min((self._tried, self._sure), key=lambda known: float(np.abs(known.z - z).max()))
+        nearest = min((self._trial, self._accepted), key=lambda known: float(np.abs(known.z - z).max()))
         return self._with_slope(z, nearest.at(z))
 
     def _with_slope(self, z: Array, near: complex) -> _Eigenvalue:
