@@ -101,7 +101,7 @@ class State:
         self.g = z[..., :-2]
         self.mass = mass = np.exp(z[..., -1:])
         m, dm = problem.share
-        self.theta = z[..., -2:-1] + (problem.accumulate @ self.g[..., None])[..., 0]
+        self.theta = z[..., -2:-1] + problem.grid.integrate(self.g * dm)
         self.overburden = mass * m
         self.p = p = self.overburden + model.surface_stress
         #: P/p, which is 1 on the half-line
@@ -110,7 +110,7 @@ class State:
         self.f, self.df = f, _ = model.closures(self.x)
         self.y = f[CONDUCTION] * self.g / mass
         self.s_p = 1.0 / (mass * dm)  # ds/dp
-        self.y_p = (self.y @ problem.grid.derivative.T) * self.s_p
+        self.y_p = problem.grid.differentiate(self.y) * self.s_p
         self.rise = p * self.g / mass - model.beta  # p dtheta/dp, less beta
         self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
         self.net_loss = f[LOSS] - model.slope**2 * f[WORK]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from chuteflow import display
 from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array, interpolation_matrix
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import secants
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
@@ -375,9 +375,7 @@ class Flow(Result):
         """Potential, gradient, closures and density at shares m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
         s = stretch_position(share, problem.stretch)
-        matrix = interpolation_matrix(problem.grid, s)
-        g = matrix @ state.g
-        theta = matrix @ state.theta
+        theta, g = problem.grid.interpolate(np.stack([state.theta, state.g]), s)
         return self._pointwise(state.mass * share + self._model.surface_stress, theta, g)
 
     def _pointwise(self, p: Array, theta: Array, g: Array) -> tuple[dict[str, Array], Array]:
@@ -441,17 +439,16 @@ class Flow(Result):
         elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
-            regular[0] = g.derivative[0] @ per_fall
+            regular[0] = g.differentiate(per_fall)[0]
         else:
             regular = per_fall / state.p * span
         glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
-        height = g.integral @ regular
-        velocity = g.integral @ glide
+        height, velocity = g.integrate(np.stack([regular, glide]))
         return height[-1] - height, self._slip + velocity[-1] - velocity
 
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
-        z = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[0]
+        z = self.solution.problem.grid.interpolate(self._antiderivatives[0], s)
         if self._model.unlimited:
             beta, mass = self._model.beta, self._state.mass[0]
             powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
@@ -482,7 +479,7 @@ class Flow(Result):
     @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         s = stretch_position(share, self.solution.problem.stretch)
-        velocity = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1]
+        velocity = self.solution.problem.grid.interpolate(self._antiderivatives[1], s)
         return self._local(*self._at_share(share)) | {"velocity": velocity}
 
     def _local(self, at: dict[str, Array], f: Array) -> dict[str, Array]:
@@ -540,9 +537,9 @@ def rough_kinds(solutions: Sequence[Solution]) -> Array:
 def _samples_of(state: State) -> dict[str, Array]:
     """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem
-    fine, matrix = problem.transferred(max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
+    fine = replace(problem, degree=max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
-    nu, rise, net = nodal @ matrix.T
+    nu, rise, net = problem.grid.interpolate(nodal, fine.grid.nodes)
     return {"share": fine.share[0], "nu": nu, "rise": rise, "net": net}
 
 

@@ -33,6 +33,10 @@ _MOST_ROUNDS = 12
 _STEEP = 1e-3
 #: A grid resolves a flow where its integrals agree to this.
 _AGREES = 1e-11
+#: Nodes of a grid in pieces up to which Newton's method is used on it: its time rises with their cube.
+_MOST_NODES = 800
+#: The elements are halved until the unknowns on such a grid change by less than this part of the largest.
+_SETTLED, _MOST_HALVINGS = 1e-11, 4
 
 
 class SolverStatus(Enum):
@@ -144,8 +148,8 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.
 
     Newton's method on the grid, at the same hold-up, or beside a fold in it across the branch: profiles are then as
-    accurate as the integrals over the depth. Where not even the last grid resolves it, they have the digits of the
-    elements there.
+    accurate as the integrals over the depth. Where the grid would have too many nodes for that, the flow on elements is
+    refined. Where not even the last grid resolves it, profiles have the digits of the elements there.
     """
     rates = solution.rates
     weights = np.array([0.0, 0.0, 1.0, 0.0])
@@ -167,16 +171,20 @@ def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[C
     agreed = resolved = False
     elements = solution.elements
     for problem, rough in elements.grids(kinks.crossings(elements)):
-        found = newton(
-            lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
-            rough,
-            tolerance=_STEP,
-            longest_step=2.0,
-        )
-        off = np.abs(problem.state(found.z).macroscopic() - solution.macroscopic)[:LOG_T].max()
-        agrees = found.converged and bool(off < max(_AGREES, solution.error))
+        if problem.grid.degree < _MOST_NODES:
+            found = newton(
+                lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
+                rough,
+                tolerance=_STEP,
+                longest_step=2.0,
+            )
+            z, converged = found.z, found.converged
+        else:
+            z, converged = _on_finer_elements(elements, problem, weights, value)
+        off = np.abs(problem.state(z).macroscopic() - solution.macroscopic)[:LOG_T].max()
+        agrees = converged and bool(off < max(_AGREES, solution.error))
         if agrees or last is None:
-            last = problem, found.z if agrees else rough
+            last = problem, z if agrees else rough
         agreed |= agrees
         # One grid more than it takes for the integrals: profiles want it.
         if agrees and resolved:
@@ -184,6 +192,20 @@ def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[C
         resolved = agrees
     assert last is not None
     return last, agreed
+
+
+def _on_finer_elements(elements: Elements, problem: Collocation, weights: Array, value: float) -> tuple[Array, bool]:
+    """The unknowns of a flow on the grid of ``problem``, from elements halved until they settle; whether they do."""
+    z = elements.unknowns(problem)
+    for _ in range(_MOST_HALVINGS):
+        finer = _iterated(elements.halved(), weights, value, _FINE_STEP)
+        if not np.isfinite(finer.step):
+            break
+        elements, before = finer.flow, z
+        z = elements.unknowns(problem)
+        if np.abs(z - before).max() < _SETTLED * np.abs(z).max():
+            return z, True
+    return z, False
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
