@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chuteflow.branches.families import families
-from chuteflow.trajectories.refining import carry_down
+from chuteflow.trajectories.refining import integrate_trajectories
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def forget() -> None:
 def forget_search() -> None:
     """Forget the families of the last chutes, and nothing else."""
     families.cache_clear()
-    carry_down.cache_clear()
+    integrate_trajectories.cache_clear()
 
 
 def _processor_time() -> float:

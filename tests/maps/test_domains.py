@@ -13,7 +13,7 @@ from chuteflow.maps.zeros import extremes_on, zeros_on
 from chuteflow.steady.model import model
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
-from chuteflow.trajectories.refining import carry_down
+from chuteflow.trajectories.refining import integrate_trajectories
 
 from .domain_points import compare, enumerated, random_planes
 
@@ -294,7 +294,7 @@ def test_the_first_inverted_flow_is_where_the_density_at_its_base_first_rises():
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():
     chute = Chute(0.38750000000000007, 0.7901041666666666, 0.8, 0.6)
-    grid = carry_down(model(chute), 1e-3, 1e5, 30.0)
+    grid = integrate_trajectories(model(chute), 1e-3, 1e5, 30.0)
     zeros = zeros_on(grid, extremes_on(grid))
     assert np.isfinite([zeros.log_q, zeros.log_m, zeros.log_t, zeros.rise]).all()
 
@@ -309,7 +309,7 @@ def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface
         (),
     )
     for u, v in np.random.default_rng(3).uniform(size=(6, 2)):
-        grid = carry_down(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
+        grid = integrate_trajectories(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
         alone = kinds(grid, extremes_on(grid), ())
         assert code(plane, u, v)[:2] == (alone.most, alone.families)
 

@@ -70,7 +70,7 @@ def bases_below(chute, temperature, stress):
 
     def along(log_p, state):
         rows = np.array([[log_p], [state[0]], [state[1]], [0.0], [0.0], [0.0]])
-        return one.along(rows), rows
+        return one.at_state(rows), rows
 
     def rate(log_p, state):
         at, rows = along(log_p, state)

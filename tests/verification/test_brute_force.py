@@ -24,7 +24,7 @@ import chuteflow
 from chuteflow import FlowSet, SolveError
 from chuteflow.branches.families import families
 from chuteflow.steady.model import model
-from chuteflow.trajectories.refining import REFINEMENT, carry_down
+from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
 
 from .brute_force import NEAR, QUANTITIES, BruteForce, Chute, Fineness, Found, balances
 
@@ -74,7 +74,7 @@ def macroscopic(found: FlowSet) -> np.ndarray:
 def ask(chute: Chute, name: str, value: float, tally: Tally, **further: Any) -> FlowSet:
     """The answer of the program, with nothing remembered, and its time."""
     families.cache_clear()
-    carry_down.cache_clear()
+    integrate_trajectories.cache_clear()
     condition: dict[str, Any] = {name: value}
     begin = time.process_time()
     try:
@@ -232,7 +232,7 @@ def check_families(tally: Tally, chute: Chute) -> None:
     """Half of delta gives the same numbers of flows at some hold-ups, unless a fold is near."""
     problem = model(chute_of(chute))
     refinements = [replace(REFINEMENT, delta=share * REFINEMENT.delta) for share in (1.0, 0.5)]
-    grids = [carry_down(problem, 1e-3, 1e5, DEEPEST, refinement) for refinement in refinements]
+    grids = [integrate_trajectories(problem, 1e-3, 1e5, DEEPEST, refinement) for refinement in refinements]
     deepest = min(grid.deepest for grid in grids)
     for mass in np.geomspace(0.01, 0.98, 12) * deepest:
         counts = [

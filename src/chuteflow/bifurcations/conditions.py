@@ -176,7 +176,7 @@ class Inversion(_OfFields):
         nodes = np.arange(len(row))
         by_z = np.zeros((len(row), len(row) + 2))
         by_z[nodes, nodes] = state.p / state.mass
-        by_z[:, -1] = (state.laden - 1.0) * state.rise
+        by_z[:, -1] = (state.overburden_fraction - 1.0) * state.rise
         # Where a largest value lies inside, moving the place changes nothing to first order.
         return float(row @ state.rise) - 1.0, row @ by_z, 0.0
 
@@ -197,7 +197,9 @@ class InteriorChange(_OfFields):
         state = at.state
         row = _largest(state.problem.grid, state.net_loss if self.largest else -state.net_loss)
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
-        by_z = np.concatenate([-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.laden]])
+        by_z = np.concatenate(
+            [-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.overburden_fraction]]
+        )
         return float(row @ state.net_loss), by_z, float(row @ derivative(at.stepped.net_loss))
 
 

@@ -110,8 +110,8 @@ def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
 def _widened(values: Array) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     # One value alone has some extent on an axis too.
-    room = _MARGIN * (high - low) or _MARGIN * max(abs(low), 1e-9)
-    return low - room, high + room
+    margin = _MARGIN * (high - low) or _MARGIN * max(abs(low), 1e-9)
+    return low - margin, high + margin
 
 
 def _regions(found: BoundarySet, frame: DiagramFrame, lines: Sequence[tuple[Array, Array]]) -> Iterator[CountedRegion]:

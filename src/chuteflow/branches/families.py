@@ -20,7 +20,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
-from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
+from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, integrate_trajectories
 
 #: Where a first or last rough flow leads nowhere, those so many places further are tried.
 _OTHERS = (0, 1, 2, 4, 8, 16)
@@ -252,7 +252,9 @@ def families(model: Model, within: SearchRange) -> tuple[Family, ...]:
 
 def search(model: Model, within: SearchRange) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
-    return carry_down(model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux)
+    return integrate_trajectories(
+        model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux
+    )
 
 
 def searched(within: SearchRange, grid: TrajectoryGrid) -> Searched:

@@ -246,8 +246,8 @@ class TrialFlow:
         """Derivatives with respect to the parameters (k, m) at a fixed label, and to the label (m,), of what changes
         ``along`` the branch (m,) and ``across`` it (k, m)."""
         weights = np.array(self.weights)
-        pace = float(weights @ self.answer.tangent)
-        return across - (weights @ self.answer.across)[:, None] * along / pace, along / pace
+        label_rate = float(weights @ self.answer.tangent)
+        return across - (weights @ self.answer.across)[:, None] * along / label_rate, along / label_rate
 
     def expected(self, values: Array, label: float) -> float:
         """How far the flow moves in m, as far as is known."""

@@ -21,7 +21,7 @@ from chuteflow.parameters import LARGEST_HOLDUP
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import model
 from chuteflow.trajectories.kernel import S_T
-from chuteflow.trajectories.refining import REFINEMENT, TrajectoryGrid, carry_down_for
+from chuteflow.trajectories.refining import REFINEMENT, TrajectoryGrid, integrate_trajectories_from
 from chuteflow.trajectories.tables import envelope
 
 #: Trajectories of the surface temperatures alone, without others between.
@@ -48,7 +48,7 @@ def exists_at(
     starts = np.unique(temperature) if len(np.unique(temperature)) > 1 else np.array([1.0, 2.0]) * temperature[0]
     for members in _sharing_trajectories(chutes):
         models = [model(chutes[i]) for i in members]
-        grid = carry_down_for(models[0], envelope(models), starts, largest_holdup, _ALONE)
+        grid = integrate_trajectories_from(models[0], envelope(models), starts, largest_holdup, _ALONE)
         for i, problem in zip(members, models, strict=True):
             found[i] = _is_met(grid.of_base(problem), temperature)
     return found
@@ -57,7 +57,7 @@ def exists_at(
 def _is_met(grid: TrajectoryGrid, temperature: Array) -> NDArray[np.bool_]:
     """Whether the trajectory of each surface temperature (C,) meets the base anywhere."""
     ends = grid.zeros[:, :2].astype(np.int64)
-    along = np.not_equal(*grid.rows_of(ends).T)
+    along = np.not_equal(*grid.steps_of(ends).T)
     return np.isin(np.log(temperature), grid.states[ends[along, 1], S_T])
 
 

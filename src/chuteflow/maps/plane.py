@@ -25,7 +25,7 @@ from chuteflow.steady.model import model
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
-from chuteflow.trajectories.refining import TrajectoryGrid, carry_down_for, starts
+from chuteflow.trajectories.refining import TrajectoryGrid, integrate_trajectories_from, starting_temperatures
 from chuteflow.trajectories.tables import ENTRIES, envelope
 
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
@@ -192,12 +192,12 @@ def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[Traject
             shares = np.linspace(0.0, 1.0, _BETWEEN)
             served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
     within = plane.within
-    temperature = starts(within.coldest, within.hottest)
+    temperature = starting_temperatures(within.coldest, within.hottest)
     if plane.temperatures:
         apart = np.abs(np.log(temperature[:, None] / np.array(plane.temperatures))).min(axis=1)
         temperature = np.unique(np.concatenate([temperature[apart > _SAME], plane.temperatures]))
     others = envelope([model(base) for base in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
-    grid = carry_down_for(model(chute), others, temperature, within.deepest)
+    grid = integrate_trajectories_from(model(chute), others, temperature, within.deepest)
     return grid, extremes_on(grid)
 
 

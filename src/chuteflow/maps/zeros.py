@@ -66,16 +66,16 @@ class Zeros:
         """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
         grid = self.grid
         zeros = grid.zeros[which]
-        rows = grid.rows_of(zeros[:, :2].astype(np.int64))
+        rows = grid.steps_of(zeros[:, :2].astype(np.int64))
         places = np.where(rows[:, 0] == rows[:, 1], zeros[:, 0] + zeros[:, 2], zeros[:, 1])
-        return kernel.extremes_back(
+        return kernel.find_extremes(
             grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
         )
 
 
 def extremes_on(grid: TrajectoryGrid) -> Array:
     """Bounds of what trajectories have had down to each state, whatever their base, (N, 6), as in :class:`Zeros`."""
-    return kernel.extremes(
+    return kernel.bound_extremes(
         grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
     )
 
@@ -84,7 +84,7 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     """The zeros of B on ``grid``, given its ``extremes`` (N, 6)."""
     ends = grid.zeros[:, :2].astype(np.int64)
     share = grid.zeros[:, 2]
-    rows = grid.rows_of(ends)
+    rows = grid.steps_of(ends)
     across = rows[:, 0] == rows[:, 1]
     used, back = np.unique(ends, return_inverse=True)
     known = _StateValues.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
@@ -95,8 +95,8 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     place = share.copy()
     down = ~across
     one_down, two_down, apart = one[down], two[down], step[down]
-    ends_down = known.excess[one_down], known.excess[two_down]
-    slopes = known.excess_down[one_down] * apart, known.excess_down[two_down] * apart
+    ends_down = known.residual[one_down], known.residual[two_down]
+    slopes = known.residual_down[one_down] * apart, known.residual_down[two_down] * apart
     place[down] = false_position(lambda t: _hermite(*ends_down, *slopes, t), share[down])
 
     def between(of: Array, down: Array) -> Array:
@@ -110,12 +110,12 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     place[across], found = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
     log_q[across], log_t[across], big_l[across], y[across] = found
 
-    excess_down, excess_across, flux_down, flux_across = (
+    residual_down, residual_across, flux_down, flux_across = (
         of[one] + share * (of[two] - of[one])
-        for of in (known.excess_down, known.excess_across, known.flux_down, known.flux_across)
+        for of in (known.residual_down, known.residual_across, known.flux_down, known.flux_across)
     )
-    size = np.abs(excess_down) + np.abs(excess_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
-    rise = (flux_across * excess_down - flux_down * excess_across) / size
+    size = np.abs(residual_down) + np.abs(residual_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
+    rise = (flux_across * residual_down - flux_down * residual_across) / size
     # The extrema are those above, or those at the base.
     low, high = extremes[ends[:, 0]], np.where(down[:, None], extremes[ends[:, 0]], extremes[ends[:, 1]])
     bounds, doubt = low + place[:, None] * (high - low), 0.5 * np.abs(high - low)[:, :3]
@@ -143,13 +143,13 @@ class _StateValues:
     log_m: Array
     big_l: Array
     y: Array
-    excess: Array
+    residual: Array
     log_q: Array
     l_down: Array
     y_down: Array
-    excess_down: Array
+    residual_down: Array
     flux_down: Array
-    excess_across: Array
+    residual_across: Array
     flux_across: Array
 
     @classmethod
@@ -157,22 +157,22 @@ class _StateValues:
         model = grid.model
         over = grid.overburden[rows]
         p = over + model.surface_stress
-        big_l, y, _t, _h, glide = grid.states[places].T
+        big_l, y, _t, _h, shear_flux = grid.states[places].T
         f, df = model.closures(np.exp(big_l))
         base, base_slope = model.base_flux(f), model.base_flux_slope(df)
         slip = model.slip(f)
         root_t = np.exp(0.5 * (np.log(p) + f[GAMMA] - big_l))
-        sliding = slip * root_t * over
-        flux = sliding + glide
+        slip_flux = slip * root_t * over
+        flux = slip_flux + shear_flux
         turn = p * y / f[CONDUCTION] - model.beta
         still = 1.0 - turn
         warming = turn + f[COUPLING] * still
-        dilation, share = over / p, sliding / flux
+        dilation, share = over / p, slip_flux / flux
         l_down = dilation * still
         y_down = over * (f[LOSS] - model.slope**2 * f[WORK]) - dilation * y * (1.0 + 0.5 * warming)
         by_l = model.slip_slope(df) / slip + 0.5 * (df[GAMMA] - 1.0)
-        glide_down = model.slope * over**2 * f[WORK] * root_t
-        l_across, y_across, glide_across = _across(grid, places, rows)
+        shear_down = model.slope * over**2 * f[WORK] * root_t
+        l_across, y_across, shear_across = _across(grid, places, rows)
         return cls(
             np.log(over),
             big_l,
@@ -182,9 +182,9 @@ class _StateValues:
             l_down,
             y_down,
             y_down - base_slope * l_down,
-            share * (1.0 + 0.5 * dilation + by_l * l_down) + glide_down / flux,
+            share * (1.0 + 0.5 * dilation + by_l * l_down) + shear_down / flux,
             y_across - base_slope * l_across,
-            share * by_l * l_across + glide_across / flux,
+            share * by_l * l_across + shear_across / flux,
         )
 
 
@@ -250,7 +250,7 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     state = grid.states[around]
     quantities = grid.quantities(around)
     f, _ = grid.model.closures(np.exp(state[..., S_L]))
-    excess = state[..., S_Y] - grid.model.base_flux(f)
+    residual = state[..., S_Y] - grid.model.base_flux(f)
     weights = np.zeros(around.shape)
     weights[:, 1], weights[:, 2] = 1.0 - share, share
     gaps = np.diff(labels, axis=1)
@@ -258,7 +258,7 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     even &= (gaps[:, [0, 2]] < _EVEN * gaps[:, 1:2]).all(axis=1) & (gaps[:, [0, 2]] * _EVEN > gaps[:, 1:2]).all(axis=1)
     if even.any():
         at = ((labels[even] - labels[even, 1:2]) / gaps[even, 1:2]).T
-        values = excess[even].T
+        values = residual[even].T
         place = false_position(lambda x: (lagrange(at, x) * values).sum(axis=0), share[even])
         cubic = lagrange(at, place)
         sound = np.abs(cubic).sum(axis=0) < _SOUND

@@ -301,15 +301,15 @@ class Flow(Result):
     def energy_budget(self) -> EnergyBudget:
         """Where fluctuation energy comes from and goes to, in the whole flow."""
         problem, state, model = self.solution.problem, self._state, self._model
-        pace = state.p * np.exp(0.5 * state.log_t)  # p sqrt(T)
-        per_node = problem.grid.weights / state.s_p * pace
+        flux_scale = state.p * np.exp(0.5 * state.log_t)  # p sqrt(T)
+        per_node = problem.grid.weights / state.s_p * flux_scale
         slip_work = model.slope * float(state.p[-1]) * self.slip_velocity
         return EnergyBudget(
             slip_work=slip_work,
-            base_loss=slip_work - float(model.base_flux(state.f[:, -1]) * pace[-1]),
+            base_loss=slip_work - float(model.base_flux(state.f[:, -1]) * flux_scale[-1]),
             shear_work=model.slope**2 * float(per_node @ state.f[WORK]),
             dissipation=float(per_node @ state.f[LOSS]),
-            heat_through_surface=model.surface_flux * float(pace[0]),
+            heat_through_surface=model.surface_flux * float(flux_scale[0]),
         )
 
     def profile(self, z: ArrayLike) -> Profile:
@@ -461,16 +461,16 @@ class Flow(Result):
     def _shares_at(self, z: Array) -> Array:
         """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
-        knots = self._samples["share"].copy()
+        samples = self._samples["share"].copy()
         if p_s == 0.0:
-            knots[0] = _SMALLEST_SHARE
-        log_p = np.interp(z, self._heights(knots)[::-1], np.log(state.mass * knots + p_s)[::-1])
-        low, high = np.log(state.mass * knots[0] + p_s), np.log(state.mass + p_s)
+            samples[0] = _SMALLEST_SHARE
+        log_p = np.interp(z, self._heights(samples)[::-1], np.log(state.mass * samples + p_s)[::-1])
+        low, high = np.log(state.mass * samples[0] + p_s), np.log(state.mass + p_s)
         for _ in range(60):
             share = np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
             fields, _ = self._at_share(share)
-            pace = np.exp(log_p) / fields["nu"]
-            move = np.clip((self._heights(share) - z) / pace, -50.0, 50.0)
+            height_rate = np.exp(log_p) / fields["nu"]
+            move = np.clip((self._heights(share) - z) / height_rate, -50.0, 50.0)
             log_p = np.clip(log_p + move, low, high)
             if np.abs(move).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(log_p).max(initial=0.0))):
                 break

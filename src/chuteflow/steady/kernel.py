@@ -117,7 +117,7 @@ def _assemble(
     f = np.empty(16)
     matrix = np.empty((2 * STAGES, 2 * STAGES))
     worst = 0.0
-    moment = glide = moment_mu = glide_mu = 0.0
+    moment = shear_flux = moment_mu = shear_flux_mu = 0.0
     jac = np.empty((STAGES, 2, 2))
     for e in range(count):
         h = breaks[e + 1] - breaks[e]
@@ -175,12 +175,12 @@ def _assemble(
             root_t = math.exp(0.5 * log_t)
             shear = weight * over * slope * f[WORK] * root_t
             moment += heights
-            glide += shear
+            shear_flux += shear
             density_x, work_x, gamma_x = f[8 + DENSITY], f[8 + WORK] / f[WORK], f[8 + GAMMA]
             by_slopes[1, e, j] = heights * (1.0 + density_x)
             by_slopes[0, e, j] = shear * (0.5 * (1.0 - gamma_x) - work_x)
             moment_mu += heights * (2.0 - (1.0 + density_x) * rho * q)
-            glide_mu += shear * (2.0 + (0.5 * (gamma_x * rho - beta) + work_x * rho) * q)
+            shear_flux_mu += shear * (2.0 + (0.5 * (gamma_x * rho - beta) + work_x * rho) * q)
         for j in range(STAGES):
             for i in range(STAGES):
                 for c in range(2):
@@ -200,7 +200,7 @@ def _assemble(
     if beta != 0.0:
         log_t -= beta * math.log(p)
     carried = slip * math.exp(0.5 * log_t) * mass
-    flux = carried + glide
+    flux = carried + shear_flux
     if not (flux > 0.0 and moment > 0.0):
         return math.inf
     by_ends[0, count, 2] = (
@@ -209,7 +209,7 @@ def _assemble(
     by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + GRIP]
     by_ends[0, count, 0] = carried * (0.5 * (1.0 - f[8 + GAMMA]) - slip_x) / flux
     by_ends[1, count, 0] = 0.0
-    by_ends[0, 0, 2] = (glide_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
+    by_ends[0, 0, 2] = (shear_flux_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
     by_ends[1, 0, 2] = moment_mu / moment - 1.0
     by_slopes[0] /= flux
     by_slopes[1] /= moment

@@ -126,9 +126,9 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence
 def _invert(density: FunctionTable, x: Array) -> Array:
     """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
     log_x = np.log(np.maximum(x, 1e-300))
-    knots = _argument(np.linspace(1e-9, UPPER, 400))
-    (log_ratio, _), _ = density(_coordinate(knots))
-    log_scaled = np.interp(log_x, np.log(knots) + log_ratio.real, np.log(knots))
+    samples = _argument(np.linspace(1e-9, UPPER, 400))
+    (log_ratio, _), _ = density(_coordinate(samples))
+    log_scaled = np.interp(log_x, np.log(samples) + log_ratio.real, np.log(samples))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
     for _ in range(4):
         scaled = np.exp(log_scaled)

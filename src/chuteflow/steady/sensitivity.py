@@ -106,8 +106,10 @@ class _PerturbedFlow(Flow):
         if start.above == 0.0:
             return height, 0.0
         moved = float(derivative(np.log(self._at_share(share)[0]["nu"][0])))
-        pace = float(start.steepness(share)["volume_fraction"][0]) / float(start.fields(share)["volume_fraction"][0])
-        above = (log_largest - moved) / pace
+        log_slope = float(start.steepness(share)["volume_fraction"][0]) / float(
+            start.fields(share)["volume_fraction"][0]
+        )
+        above = (log_largest - moved) / log_slope
         return height + float(start.steepness(share)["height"][0]) * above, above
 
 
@@ -169,9 +171,9 @@ class _ReferenceFlow:
         mass = state.mass[0]
         p = mass * share + flow._model.surface_stress
         local = flow._local(*flow._pointwise(stepped(p, mass), stepped(theta, g), stepped(g, bend)))
-        pace = -mass / np.real(local["volume_fraction"])  # dz/dshare
+        height_slope = -mass / np.real(local["volume_fraction"])  # dz/dshare
         rates = {name: derivative(values) for name, values in local.items()}
-        return rates | {"height": pace, "velocity": np.real(local["shear_rate"]) * pace}
+        return rates | {"height": height_slope, "velocity": np.real(local["shear_rate"]) * height_slope}
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.sweeps.aligned import AlignedArrays
-from chuteflow.sweeps.batch import GLIDE, LOG_P, MOMENT, ROWS, Batch, Indices, Pointwise
+from chuteflow.sweeps.batch import LOG_P, MOMENT, ROWS, SHEAR_FLUX, Batch, Indices, Pointwise
 from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
 #: Accuracies, one after the other: a member goes on to the next until its flows are settled.
@@ -58,9 +58,9 @@ def meets_base(at: Pointwise, _: Indices) -> Array:
 def flows_on(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
     """The zeros of :func:`meets_base` as flows, without an error as yet."""
     member, state = found.member, found.state
-    at = batch.take(member).along(state)
+    at = batch.take(member).at_state(state)
     mass = at.p - batch.surface_stress
-    flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[GLIDE]
+    flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[SHEAR_FLUX]
     macroscopic = np.empty((4, member.size))
     macroscopic[LOG_Q] = np.log(np.maximum(flux, np.finfo(float).tiny))
     macroscopic[LOG_H] = np.log(at.p * state[MOMENT] / mass)

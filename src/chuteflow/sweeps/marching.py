@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import zeros
 from chuteflow.sweeps.aligned import AlignedArrays
-from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Batch, Indices, Pointwise
+from chuteflow.sweeps.batch import FLUX, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, SHEAR_FLUX, Batch, Indices, Pointwise
 
 Event = Callable[[Pointwise, Indices], Array]
 
@@ -71,7 +71,7 @@ class Ends(AlignedArrays):
     @classmethod
     def of(cls, batch: Batch, deepest: Array) -> Ends:
         """The ends of the members of ``batch`` at normal stresses ``deepest`` (n,)."""
-        rate, balance = batch.pace()
+        rate, balance = batch.fastest_rates()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
         thin = np.full(len(batch), -np.inf)
         settled, low, high = np.full((3, len(batch)), np.inf)
@@ -186,7 +186,7 @@ def _march(
     with np.errstate(all="ignore"):
         state, above = start(batch, temperature, ends.rate, accuracy.start)
         member = np.arange(len(batch))
-        here = batch.along(state)
+        here = batch.at_state(state)
         slope = np.empty_like(state)
         _in_tau(here, state, ends.turn, slope)
         seen = event(here, member)
@@ -240,12 +240,12 @@ def _step(
     for i in range(1, 12):
         moved = state.copy()
         moved[:HEIGHT] += h * _combined(a[i, :i], stages[:i, :HEIGHT])  # nothing depends on the height
-        at = batch.along(moved)
+        at = batch.at_state(moved)
         _in_tau(at, moved, ends.turn, stages[i])
         if i in _SEEN:
             values[i] = event(at)
     end = state + h * _combined(b, stages[:12])
-    at = batch.along(end)
+    at = batch.at_state(end)
     _in_tau(at, end, ends.turn, stages[12])
     values[12] = event(at)
     return end
@@ -339,7 +339,7 @@ class PartialSteps:
             local, edges, member = self.batch.take(some), self.ends.take(some), self.member[some]
             state = self.state[:, some]
             stages, seen = np.empty((13, ROWS, some.size)), np.empty((13, some.size))
-            _in_tau(local.along(state), state, edges.turn, stages[0])
+            _in_tau(local.at_state(state), state, edges.turn, stages[0])
             out[:, part] = _step(
                 local,
                 edges,
@@ -393,7 +393,7 @@ def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tup
     """States (ROWS, n) a little below the free surface, or at the interface, and the fields at the very surface."""
     if batch.surface_stress:
         state = _at_interface(batch, temperature)
-        return state, batch.along(state)
+        return state, batch.at_state(state)
     p = fraction * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
     empty = Pointwise(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
     return _series(batch, temperature, p, empty), empty
@@ -426,7 +426,7 @@ def _series(batch: Batch, temperature: Array, p: Array, empty: Pointwise) -> Arr
     thickness = derivative[HEIGHT]
     thinning = thickness * (1.0 - derivative[LOG_X] / (1.0 + x / densest))
     state[MOMENT] = (temperature + 2.0 * thickness) / 3.0 - thinning / 6.0
-    state[GLIDE] = batch.slope * empty.work * np.sqrt(temperature) / 6.0 + derivative[GLIDE] / 3.0
+    state[SHEAR_FLUX] = batch.slope * empty.work * np.sqrt(temperature) / 6.0 + derivative[SHEAR_FLUX] / 3.0
     return state
 
 

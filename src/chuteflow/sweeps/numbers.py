@@ -33,9 +33,9 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
         "centre_of_mass": lambda: np.exp(flows.macroscopic[LOG_H]),
         "mass_holdup": lambda: np.exp(flows.macroscopic[LOG_M]),
         "surface_temperature": lambda: flows.temperature,
-        "base_temperature": lambda: of.along(flows.state).temperature,
-        "base_volume_fraction": lambda: of.along(flows.state).nu,
-        "slip_velocity": lambda: _slip(of.along(flows.state)),
+        "base_temperature": lambda: of.at_state(flows.state).temperature,
+        "base_volume_fraction": lambda: of.at_state(flows.state).nu,
+        "slip_velocity": lambda: _slip(of.at_state(flows.state)),
         "mean_velocity": lambda: _mean_velocity(flows),
         "angle": lambda: np.degrees(np.arctan(of.slope)),
     }
@@ -74,11 +74,11 @@ class InteriorQuantities:
         self._first, _ = start(of, flows.temperature, self._ends.rate, _ACCURACY.start)
         # Where the density turns: v = 1.
         self._turns = self._march(lambda at, _: at.v - 1.0)
-        first, base = np.exp(self._first[LOG_X]), of.along(flows.state).nu
+        first, base = np.exp(self._first[LOG_X]), of.at_state(flows.state).nu
         largest = np.maximum(first / (1.0 + first / of.law.densest), base)
         member, state = self._turns
         if member.size:
-            np.maximum.at(largest, member, of.take(member).along(state).nu)
+            np.maximum.at(largest, member, of.take(member).at_state(state).nu)
         self.largest: Array = largest
 
     def _march(self, event: Callable[[Pointwise, Indices], Array]) -> tuple[Indices, Array]:
@@ -89,15 +89,15 @@ class InteriorQuantities:
     @property
     def inverted(self) -> Array:
         """1 where the volume fraction rises with height anywhere: where it falls downwards at a turn or the base."""
-        out = self._of.along(self._flows.state).v > 1.0
-        out |= self._of.along(self._first).v > 1.0
+        out = self._of.at_state(self._flows.state).v > 1.0
+        out |= self._of.at_state(self._first).v > 1.0
         out[self._turns[0]] = True
         return out.astype(float)
 
     @property
     def interior(self) -> Array:
         """Places among INTERIORS."""
-        nets = [self._of.along(self._first).net, self._of.along(self._flows.state).net]
+        nets = [self._of.at_state(self._first).net, self._of.at_state(self._flows.state).net]
         size = np.maximum(np.abs(nets[0]), np.abs(nets[1]))
         member, _ = self._march(lambda at, _: at.net)
         gains = (nets[0] < -_DECIDES * size) | (nets[1] < -_DECIDES * size)

@@ -146,15 +146,15 @@ def _verdict(flow: Flow, last: RelaxationState, end: Outcome, scales: Scales | N
     away = f"{100.0 * end.distance:.2g} % away"
     if end.distance < _SETTLED:
         return f"it has come to {name}: {away} at t = {ended}"
-    pace = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
+    rate = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
     if end.leading is not None:
-        pace += (
+        rate += (
             f" (the leading discrete mode of that flow has the rate {said('growth', end.leading)}; what is slower "
             "belongs to the continuous spectrum and depends on the grid)"
         )
     if end.distance < _ARRIVED and end.rate < 0.0:
-        return f"it comes to {name}: {away} at t = {ended}, and {pace}"
-    return f"not settled at t = {ended}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
+        return f"it comes to {name}: {away} at t = {ended}, and {rate}"
+    return f"not settled at t = {ended}: the nearest is {name}, {away}, and {rate}; give a longer --duration"
 
 
 def _rows(content: dict[str, Any]) -> list[list[str]]:

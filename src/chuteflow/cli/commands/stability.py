@@ -177,14 +177,14 @@ def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: 
     from chuteflow.io.contract import factor
 
     chute = answer.flow.chute
-    wave, rate, pace = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
+    wave, rate, speed_unit = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
     start = [number, *tables.numbers(answer.flow, columns, chute, scales)]
     verdict = _VERDICTS[None if answer.found is None else answer.found.stable]
     if not answer.modes:
         yield [*start, verdict, *("-" for _ in range(6))]
     for i, mode in enumerate(answer.modes):
         place = [*start, verdict] if i == 0 else [""] * (len(start) + 1)
-        speed = "-" if mode.speed is None else tables.number(pace * mode.speed)
+        speed = "-" if mode.speed is None else tables.number(speed_unit * mode.speed)
         numbers = map(tables.number, (wave * mode.kx, wave * mode.ky, rate * mode.growth))
         yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
 

@@ -142,7 +142,7 @@ class PointValues:
     ``nu`` volume fraction; ``momentum`` residual of (3.8); ``flux`` phi, and ``conduction`` its part along the
     temperature gradient; ``heating`` right-hand side of (3.9) times omega; ``stress`` p; ``base`` residual of
     (3.17); ``surface`` residuals of the conditions at zeta = 0; ``mass`` x^2; ``glide`` s (g1/g2) x^2 y/nu, with
-    du/dz = glide/S^(1/2); ``slip`` F1 y; ``dissipation`` g5/nu^2.
+    du/dz = scaled_shear_rate/S^(1/2); ``slip`` F1 y; ``dissipation`` g5/nu^2.
     """
 
     nu: Field
@@ -154,7 +154,7 @@ class PointValues:
     base: Field
     surface: tuple[Field, ...]
     mass: Field
-    glide: Field
+    scaled_shear_rate: Field
     slip: Field
     dissipation: Field
 
@@ -260,7 +260,7 @@ class MappedSystem:
             base=flux - base_flux * stress * y,
             surface=surface,
             mass=mass,
-            glide=s * work * mass * y,
+            scaled_shear_rate=s * work * mass * y,
             slip=slip * y,
             dissipation=g.dissipation,
         )
@@ -395,7 +395,7 @@ class _Evaluation:
         m, kappa, scale = self.sampling, self.system.kappa, self.scale
         nodes, omega = slice(1, -1), self.omega[1:-1]
         mass, mass_z = self.both(self.at.mass / self.omega, nodes)  # nu dz/dzeta over kappa
-        glide, glide_z = self.both(self.at.glide / self.omega, nodes)
+        scaled_shear_rate, shear_rate_z = self.both(self.at.scaled_shear_rate / self.omega, nodes)
         slip, slip_z = (part[0] for part in self.both(self.at.slip, slice(-1, None)))
         surface_z = np.zeros(mass_z.shape[1])
         surface_z[self.n_x : -2] = m.basis[0, : self.n_y] * 2.0 / self.y_surface
@@ -408,9 +408,11 @@ class _Evaluation:
 
         holdup, holdup_z = kappa * (m.weights @ mass), kappa * (m.weights @ mass_z)
         moment, moment_z = m.weights / omega @ above, gradient_of_sum(m.weights / omega)  # over kappa S
-        carried = slip * holdup + kappa * (m.weights @ (above * glide))  # Q over sqrt(S)
+        carried = slip * holdup + kappa * (m.weights @ (above * scaled_shear_rate))  # Q over sqrt(S)
         carried_z = slip * holdup_z + holdup * slip_z
-        carried_z = carried_z + kappa * (gradient_of_sum(m.weights * glide) + (m.weights * above) @ glide_z)
+        carried_z = carried_z + kappa * (
+            gradient_of_sum(m.weights * scaled_shear_rate) + (m.weights * above) @ shear_rate_z
+        )
         by_scale = np.zeros_like(surface_z)
         by_scale[-2] = 1.0
         root = np.sqrt(scale)
@@ -528,7 +530,7 @@ class MappedSolution:
         root = np.exp(0.5 * self.z[-2])
         y = _series(system.split(self.z)[1], zeta, 0)
         scaled_flux = omega * root
-        shear_rate = at.glide / root
+        shear_rate = at.scaled_shear_rate / root
         return Profile(
             height=z.copy(),
             volume_fraction=at.nu,
@@ -554,7 +556,7 @@ class MappedSolution:
         """Coefficients of u(zeta), from (3.10) upwards from the slip velocity (3.15)."""
         m, root = sampling(self.degree), np.exp(0.5 * self.z[-2])
         nodes = m.points[1:-1]
-        rate = self._local(nodes).glide / self.system.omega(nodes)
+        rate = self._local(nodes).scaled_shear_rate / self.system.omega(nodes)
         gained = 0.5 * chebyshev.chebint(m.to_coefficients @ rate, lbnd=1)
         velocity = -self.system.kappa * root * gained
         velocity[0] += root * float(self._local(np.ones(1)).slip[0])
