@@ -111,7 +111,7 @@ def test_lines_hold_the_numbers_that_place_a_flow():
         "<Flow: hot, dilute, deep; Q = 3, h = 8.8389, M = 0.43922, T_surface = 7.3386, "
     )
     assert repr(paper_flows()) == "<FlowSet: 3 flows; T_surface = 7.3386, 2.5405, 0.19681>"
-    assert repr(paper_curve()).startswith("<Curve: 1 family, 200 flows; Q from ")
+    assert repr(paper_curve()).startswith("<Curve: 1 branch, 200 flows; Q from ")
     assert repr(chuteflow.flows(NOWHERE, Q=3.0)).startswith("<FlowSet: 0 flows; ")
 
 

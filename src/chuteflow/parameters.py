@@ -61,7 +61,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class FlowCondition:
-    """A number that picks flows out of a family.
+    """A number that picks flows out of a branch.
 
     ``key`` is the argument of :func:`chuteflow.flows` and the symbol in JSON and studies, ``quantity`` the name in the
     registry of quantities, ``option`` that on the command line. It is from ``low`` to ``high``.

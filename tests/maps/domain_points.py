@@ -37,7 +37,7 @@ def random_planes(seed, surface="free"):
 
 
 def enumerated(chute):
-    """The class of a chute by the curve of all its families and all flows at each temperature."""
+    """The class of a chute by the curve of all its branches and all flows at each temperature."""
     found = curve(chute, tolerance=1e-8, points=300)
     stretches = []
     for branch in found.branches:

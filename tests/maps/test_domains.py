@@ -104,7 +104,7 @@ def test_what_deep_trajectories_show_by_interpolation_alone_is_no_kind(seed, slo
 @pytest.mark.parametrize("seed", range(100, 110))
 def test_a_thousand_points_for_each_surface_are_classified_as_by_the_full_enumeration(surface, seed):
     _near, far, unknown = compare(seed, 100, 2e-3, surface)
-    # Where deep families are many, neither side is sure of their number.
+    # Where deep branches are many, neither side is sure of their number.
     assert len({chute for _, _, _, chute in far}) <= 3
     assert len(unknown) <= 3
 
@@ -254,7 +254,7 @@ def test_what_cannot_be_mapped_is_refused(changed, what):
 
 
 def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
-    # ln Q = s^3 - s/4 along a family, between whose points it rises throughout.
+    # ln Q = s^3 - s/4 along a branch, between whose points it rises throughout.
     s = np.array([-1.2, -0.8, -0.55, 0.55, 0.8, 1.2])
     log_q, rise = s**3 - 0.25 * s, 3.0 * s**2 - 0.25
     assert (np.diff(log_q) > 0.0).all()

@@ -1,4 +1,4 @@
-"""Neutral curves: of a plane with known ones, of flow A of the paper, and along its family."""
+"""Neutral curves: of a plane with known ones, of flow A of the paper, and along its branch."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace

@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
-from chuteflow.branches.families import doubt
 from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import doubt
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories

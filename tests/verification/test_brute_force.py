@@ -22,7 +22,7 @@ import pytest
 
 import chuteflow
 from chuteflow import FlowSet, SolveError
-from chuteflow.branches.families import families
+from chuteflow.branches.solution_branches import find_branches
 from chuteflow.steady.model import model
 from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
 
@@ -73,7 +73,7 @@ def macroscopic(found: FlowSet) -> np.ndarray:
 
 def ask(chute: Chute, name: str, value: float, tally: Tally, **further: Any) -> FlowSet:
     """The answer of the program, with nothing remembered, and its time."""
-    families.cache_clear()
+    find_branches.cache_clear()
     integrate_trajectories.cache_clear()
     condition: dict[str, Any] = {name: value}
     begin = time.process_time()
@@ -221,14 +221,14 @@ def run(group: str, share: float, seed: int = 14) -> Tally:
         chute = sample(rng)
         for name, value, expected, deepest in questions(rng, chute, deep_only):
             compare(tally, chute, name, value, deepest, expected)
-        check_families(tally, chute)
+        check_branches(tally, chute)
         print(*(f"{group} {i} {line}\n" for line in tally.wrong[seen:]), sep="", end="", flush=True)
         seen = len(tally.wrong)
     print(group, tally, flush=True)
     return tally
 
 
-def check_families(tally: Tally, chute: Chute) -> None:
+def check_branches(tally: Tally, chute: Chute) -> None:
     """Half of delta gives the same numbers of flows at some hold-ups, unless a fold is near."""
     problem = model(chute_of(chute))
     refinements = [replace(REFINEMENT, delta=share * REFINEMENT.delta) for share in (1.0, 0.5)]

@@ -1,11 +1,11 @@
-"""Which flows of a family lie on a boundary: scalar conditions with their exact derivatives.
+"""Which flows of a branch lie on a boundary: scalar conditions with their exact derivatives.
 
 # notation: z unknowns of a flow (n+3,), lambda the second parameter, F(z, lambda) = 0 the steady problem,
 # m a macroscopic quantity, eps a step along the imaginary axis.
 
-A condition is a number G(z, lambda) that vanishes on the boundary and is defined off it and off the family too.
+A condition is a number G(z, lambda) that vanishes on the boundary and is defined off it and off the branch too.
 
-**Folds.** The quantity m turns along a family where the square matrix A = [F_z; m_z] is singular. With fixed
+**Folds.** The quantity m turns along a branch where the square matrix A = [F_z; m_z] is singular. With fixed
 borders b and c near its null vectors, G and the vectors v and w solve
 
     [A b; c' 0] [v; G] = [0; 1],      [A' c; b' 0] [w; G] = [0; 1],
@@ -13,7 +13,7 @@ borders b and c near its null vectors, G and the vectors v and w solve
 and dG = -w' dA v (A. Griewank and G. W. Reddien 1984, SIAM J. Numer. Anal. 21, 176-185; W. Govaerts 2000,
 Numerical Methods for Bifurcations of Dynamical Equilibria). Since A holds first derivatives, dA v with
 respect to z is the derivative along v of w' A: one evaluation at z + i eps v, exact to rounding. A stays singular
-where a family is born as a point or exchanges its ends with another (F_z loses rank there), and is singular
+where a branch is born as a point or exchanges its ends with another (F_z loses rank there), and is singular
 there for every m: such points are regular points of the curve G = 0.
 """
 
@@ -58,14 +58,14 @@ class Linearisation:
 
 
 class TestFunction(Protocol):
-    """A condition as it is evaluated along a boundary, and before that along a family of flows."""
+    """A condition as it is evaluated along a boundary, and before that along a branch of flows."""
 
     @property
     def turns(self) -> bool:
-        """Whether the boundary is where what :meth:`along_family` gives turns; else it is where that vanishes."""
+        """Whether the boundary is where what :meth:`along_branch` gives turns; else it is where that vanishes."""
         ...
 
-    def along_family(self, at: Linearisation) -> tuple[float, Array]:
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
         """A function of the flow, and its gradient in z (n+3,)."""
         ...
 
@@ -94,7 +94,7 @@ class Fold:
     right: Array = field(default_factory=lambda: np.empty(0))
     turns = True
 
-    def along_family(self, at: Linearisation) -> tuple[float, Array]:
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
         """See :class:`TestFunction`."""
         return float(at.state.macroscopic()[self.which]), at.state.macroscopic_gradient()[self.which]
 
@@ -121,7 +121,7 @@ class Fold:
         return Fold(self.which, u[:, -1], v[-1])
 
     def pivot(self, at: Linearisation) -> float:
-        """Share of the gradient of the quantity in the left null vector: 0 where the family itself is singular."""
+        """Share of the gradient of the quantity in the left null vector: 0 where the branch itself is singular."""
         _, _, w = self._solved(at)
         return abs(float(w[-1])) / float(np.linalg.norm(w))
 
@@ -146,7 +146,7 @@ class _OfFields:
         """See :class:`TestFunction`."""
         raise NotImplementedError
 
-    def along_family(self, at: Linearisation) -> tuple[float, Array]:
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
         """See :class:`TestFunction`."""
         value, gradient, _ = self(at)
         return value, gradient

@@ -1,11 +1,11 @@
-"""Where boundaries are entered: their points on the families of flows at one value of the second parameter.
+"""Where boundaries are entered: their points on the branches of flows at one value of the second parameter.
 
-# notation: sigma runs from 0 to 1 along the chord between two successive flows of a family in the plane
+# notation: sigma runs from 0 to 1 along the chord between two successive flows of a branch in the plane
 # (ln M, ln T_surface).
 
 A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
 either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
-from the ends of families, the parameter is moved until the condition holds.
+from the ends of branches, the parameter is moved until the condition holds.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import numpy as np
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, Linearisation, TestFunction
 from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
-from chuteflow.branches.families import TracedFamily, traced_families
 from chuteflow.branches.paths import solve_between
 from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import TracedBranch, trace_branches
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
@@ -39,7 +39,7 @@ HELD = np.array([0.0, 0.0, 1.0])
 _BEYOND, _BESIDE = 0.02, 1.0
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
-#: A boundary beside the families is looked for as far as so many times the distance to go to it.
+#: A boundary beside the branches is looked for as far as so many times the distance to go to it.
 _FARTHER = 1.5
 #: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
 #: tolerance, and ends where so small a share is left.
@@ -54,7 +54,7 @@ _LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
 
 @dataclass(frozen=True, eq=False)
 class _SampledFlow:
-    """A flow of a family, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
+    """A flow of a branch, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
     plane (ln M, ln T_surface), (2, n+3), and the Jacobian of the steady problem."""
 
     solution: Solution
@@ -78,20 +78,20 @@ def conditions(kind: str) -> Sequence[TestFunction]:
     return [Inversion()] if kind == "density-inversion" else [InteriorChange(False), InteriorChange(True)]
 
 
-def on_families(
+def on_branches(
     sweep: SecondParameter,
     condition: TestFunction,
     value: float,
-    families: Sequence[TracedFamily],
+    branches: Sequence[TracedBranch],
     reach: float,
     tolerance: float,
 ) -> Iterator[BoundaryPoint]:
-    """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
-    far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+    """Every point of the boundary on branches of flows at one value of the parameter, and points beside them, as
+    far as ``reach`` in the parameter, where a branch comes near to the condition and does not meet it."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
         if isinstance(condition, Fold):
-            for turn in family.turns(condition.which, tolerance):
+            for turn in branch.turns(condition.which, tolerance):
                 if turn.point.solution.problem.breaks == WHOLE:
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
@@ -102,14 +102,14 @@ def on_families(
                 yield point
 
 
-def _in_one_piece(family: TracedFamily) -> list[Solution]:
-    """The flows of a family that one grid resolves: boundaries are followed on such."""
-    return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
+def _in_one_piece(branch: TracedBranch) -> list[Solution]:
+    """The flows of a branch that one grid resolves: boundaries are followed on such."""
+    return [solution for solution in branch.solutions if solution.problem.breaks == WHOLE]
 
 
-def families_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedFamily]:
-    """Every family of flows in a range at one value of the parameter."""
-    return traced_families(model(sweep.chute_at(value)), within)
+def branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
+    """Every branch of flows in a range at one value of the parameter."""
+    return trace_branches(model(sweep.chute_at(value)), within)
 
 
 def _from_flow(
@@ -124,7 +124,7 @@ def _from_flow(
 def _zeros(
     sweep: SecondParameter, condition: TestFunction, value: float, samples: Sequence[_SampledFlow], tolerance: float
 ) -> list[BoundaryPoint]:
-    """The points along a family where the condition's function vanishes."""
+    """The points along a branch where the condition's function vanishes."""
     found: list[BoundaryPoint] = []
     for first, last in pairwise(samples):
         for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
@@ -204,7 +204,7 @@ def _near(
 
 
 def _nearest(samples: Sequence[_SampledFlow], condition: TestFunction) -> Iterator[tuple[int, Array]]:
-    """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
+    """Indices of the flows that come nearest to the condition, or end the branch on the way to it, with a chord."""
     plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
     chords = np.diff(plane, axis=0)
     if len(samples) < 3 or not chords.any(axis=1).all():
@@ -230,7 +230,7 @@ def _beside(
     reach: float,
     tolerance: float,
 ) -> BoundaryPoint | None:
-    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
+    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its branch."""
     row = np.array([chord[1], chord[0], 0.0])
     plane = Condition.plane(chord, solution.macroscopic)
     at = value
@@ -266,12 +266,12 @@ def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solut
     here, beyond = sweep.models(value)
     degree, stretch = solution.problem.degree, solution.problem.stretch
     at = Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
-    f, gradient = condition.along_family(at)
+    f, gradient = condition.along_branch(at)
     return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
 
 def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
-    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole families.
+    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole branches.
 
     On the half-line dissipation and production balance at the surface, or at the density where they come nearest
     to it, in all flows of a chute that have that density or in none.
@@ -287,12 +287,12 @@ def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: floa
     return out
 
 
-def along_families(
-    sweep: SecondParameter, condition: TestFunction, value: float, families: Sequence[TracedFamily], tolerance: float
+def along_branches(
+    sweep: SecondParameter, condition: TestFunction, value: float, branches: Sequence[TracedBranch], tolerance: float
 ) -> Iterator[BoundaryPoint]:
-    """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+    """One point of each stretch of the branches of flows at a value of the parameter that is boundary throughout."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):

@@ -27,7 +27,7 @@ CONTROL = ContinuationSettings(
 )
 #: A boundary is closed where it passes its start within this part of the step, in about its direction.
 _CLOSE, _ALONG = 0.05, 0.9
-#: Below this share of the quantity in the null vector, the family itself is singular.
+#: Below this share of the quantity in the null vector, the branch itself is singular.
 _SINGULAR = 1e-5
 #: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
@@ -44,8 +44,8 @@ _NO_RATE = 1e-10
 #: Kinds of turning points, and what they are.
 TURNS = {
     "cusp": "two folds meet: three flows become one",
-    "birth": "a closed family of flows shrinks to a point",
-    "crossing": "two families of flows meet and exchange their ends",
+    "birth": "a closed branch of flows shrinks to a point",
+    "crossing": "two branches of flows meet and exchange their ends",
     "turn": "the boundary turns back in the parameter",
 }
 

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.branches.families import trace_all
 from chuteflow.branches.lines import SteadyBranch
 from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Branch, Curve
+from chuteflow.branches.solution_branches import trace_all
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_Q
@@ -65,15 +65,15 @@ def most_solved(problem: Model, within: SearchRange, tolerance: float) -> int | 
     """The largest number of flows in a range that share one mass flux, by branches solved from end to end; None where
     one of them could not be followed."""
     try:
-        families, lost = trace_all(problem, within, tolerance)
+        branches, lost = trace_all(problem, within, tolerance)
         stops = [
-            [family.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), family.macroscopic[-1, LOG_Q]]
-            for family in families
-            for turning in [family.turns(LOG_Q, tolerance)]
+            [branch.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), branch.macroscopic[-1, LOG_Q]]
+            for branch in branches
+            for turning in [branch.turns(LOG_Q, tolerance)]
         ]
     except SolveError:
         return None
-    if lost or any(BranchEnd.LOST in family.ends for family in families):
+    if lost or any(BranchEnd.LOST in branch.ends for branch in branches):
         return None
     stretches = [sorted(pair) for along in stops for pair in pairwise(along)]
     return most_at_once(np.array(stretches)) if stretches else 0

@@ -1,7 +1,7 @@
 """Every steady flow of a chute at a given flux, hold-up, centre of mass or surface temperature.
 
 The branches of flows come from the grid of trajectories (:mod:`chuteflow.trajectories.refining`). Along each, the flows
-that meet the condition are where the quantity takes its value (:mod:`chuteflow.branches.families`).
+that meet the condition are where the quantity takes its value (:mod:`chuteflow.branches.solution_branches`).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any, TypeAlias, overload
 import numpy as np
 
 from chuteflow.branches.existence import reason_for_none
-from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import FlowSet, FlowSets
+from chuteflow.branches.solution_branches import SolutionBranch, crossings, doubt, find_branches, search, searched
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -32,7 +32,7 @@ from chuteflow.trajectories.refining import TrajectoryGrid
 Values: TypeAlias = Sequence[float] | Array
 
 _EXTENSIONS = 4
-#: A family leads out of the range towards a value if the quantity rises at least with this power there.
+#: A branch leads out of the range towards a value if the quantity rises at least with this power there.
 _LEADS = 0.25
 #: The range is not extended to larger hold-ups where there are more branches: their number would grow.
 _MOST_DEEPER = 4
@@ -90,7 +90,7 @@ def flows(
         h: centre of mass (3.27).
         T_surface: granular temperature far above (half-line) or at the interface.
         tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
-        surface_temperature: range searched. It is extended where a family of flows leads out of it towards
+        surface_temperature: range searched. It is extended where a branch of flows leads out of it towards
             the value asked for; the range that was searched in the end is part of the result.
         largest_holdup: range searched, extended in the same way.
 
@@ -135,7 +135,7 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
         tolerance=tolerance,
         reason=None
         if found.solutions
-        else reason_for_none(problem, [f.macroscopic for f in found.families], which, value, found.within),
+        else reason_for_none(problem, [f.macroscopic for f in found.branches], which, value, found.within),
         incomplete=_left_out(found, which, value),
     )
 
@@ -146,7 +146,7 @@ class _BranchSearch:
     rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
 
     within: SearchRange
-    families: tuple[Family, ...]
+    branches: tuple[SolutionBranch, ...]
     solutions: list[Solution]
     beyond: list[Solution]
     lost: list[Array]
@@ -154,11 +154,11 @@ class _BranchSearch:
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: SearchRange) -> _BranchSearch:
-    found = families(problem, within)
+    found = find_branches(problem, within)
     solutions: list[Solution] = []
     lost: list[Array] = []
-    for family in found:
-        solved, missed = crossings(family, which, value, tolerance)
+    for branch in found:
+        solved, missed = crossings(branch, which, value, tolerance)
         solutions += solved
         lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
@@ -183,7 +183,7 @@ def asked(given: Mapping[str, Any]) -> tuple[int, float]:
 
 @dataclass(frozen=True)
 class _Extrapolation:
-    """Where a family leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
+    """Where a branch leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
     LOG_T or LOG_M, there to reach the value at about ``place``, a logarithm."""
 
     axis: int
@@ -193,8 +193,8 @@ class _Extrapolation:
 
 def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapolation]:
     target = float(np.log(value))
-    for family in search.families:
-        m = family.macroscopic
+    for branch in search.branches:
+        m = branch.macroscopic
         for end, before in ((m[0], m[1]), (m[-1], m[-2])) if len(m) > 1 else ():
             left = target - float(end[which])
             for axis in (LOG_T, LOG_M):
@@ -224,7 +224,7 @@ def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
 def _wider(found: _BranchSearch, which: int, value: float) -> SearchRange:
     """The range with which branches that lead out of it towards ``value`` reach it."""
     within = wider = found.within
-    axes = (LOG_T, LOG_M) if len(found.families) <= _MOST_DEEPER else (LOG_T,)
+    axes = (LOG_T, LOG_M) if len(found.branches) <= _MOST_DEEPER else (LOG_T,)
     for lead in _leads(found, which, value):
         if lead.axis in axes:
             wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))

@@ -1,4 +1,4 @@
-"""Why there is no flow: where energy cannot balance, or where the families that exist do not lead.
+"""Why there is no flow: where energy cannot balance, or where the branches that exist do not lead.
 
 # notation: y = q/(p sqrt(T)) heat flux, base(nu) the flux that the base gives, net = loss - s^2 work.
 """
@@ -19,10 +19,10 @@ _NAMES = ("Q", "h", "M", "T_surface")
 _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
 
 
-def reason_for_none(model: Model, families: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
-    """One sentence on why no flow was found, given the quantities (k, 4) of the families that were."""
-    if families:
-        spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in families]
+def reason_for_none(model: Model, branches: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
+    """One sentence on why no flow was found, given the quantities (k, 4) of the branches that were."""
+    if branches:
+        spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in branches]
         ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
         return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"

@@ -14,8 +14,8 @@ import numpy as np
 
 from chuteflow import display
 from chuteflow.branches.enumeration import asked, flows_within
-from chuteflow.branches.families import families, search
 from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import find_branches, search
 from chuteflow.errors import ChuteflowError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE, Parameter
@@ -121,7 +121,7 @@ class _Target:
     def surely_on(self, chute: Chute) -> bool:
         """Whether a flow of ``chute`` is solved that meets it."""
         if self.value is None:
-            return any(family.solved(0, TOLERANCE) for family in families(model(chute), self.within))
+            return any(branch.solved(0, TOLERANCE) for branch in find_branches(model(chute), self.within))
         return len(flows_within(chute, self.which, self.value, TOLERANCE, self.within)) > 0
 
     def cells(self, chute: Chute) -> int:
@@ -133,7 +133,7 @@ class _Target:
 
     def _rough(self, chute: Chute) -> list[Array]:
         try:
-            return [family.macroscopic for family in families(model(chute), self.within)]
+            return [branch.macroscopic for branch in find_branches(model(chute), self.within)]
         except ChuteflowError:
             return []  # a chute whose law has no meaning there, or that cannot be searched
 
@@ -142,13 +142,13 @@ def _nearest_value(chute: Chute, which: int, value: float, within: SearchRange) 
     """The value nearest to ``value`` of the quantity ``which`` at which a flow of the chute itself is solved."""
     target = math.log(value)
     ends = [
-        (abs(float(m[i, which]) - target), family, int(i))
-        for family in families(model(chute), within)
-        for m in (family.macroscopic,)
+        (abs(float(m[i, which]) - target), branch, int(i))
+        for branch in find_branches(model(chute), within)
+        for m in (branch.macroscopic,)
         for i in (np.abs(m[:, which] - target).argmin(),)
     ]
-    for _, family, i in sorted(ends, key=lambda end: end[0]):
-        point = family.solved(i, TOLERANCE)
+    for _, branch, i in sorted(ends, key=lambda end: end[0]):
+        point = branch.solved(i, TOLERANCE)
         if point is not None:
             return float(np.exp(point.m[which]))
     return None

@@ -18,6 +18,7 @@ import numpy as np
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.elements import Elements
+from chuteflow.steady.flow import Flow
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, between, solve
 
 #: Neighbouring points suffice where their tangents differ by less than this angle, and their mean from the chord by
@@ -84,6 +85,16 @@ def solve_between(first: Solution, last: Solution, fraction: float, tolerance: f
     if point is None:
         raise SolveError("a flow between two others of a branch could not be solved: ask for a larger tolerance")
     return point.solution
+
+
+def flow_between(flows: Sequence[Flow], position: float) -> Flow:
+    """The flow at a position between two neighbours of a branch, or a little beyond its ends, counted in ``flows``."""
+    i = int(np.clip(np.floor(position), 0, len(flows) - 2))
+    first, last = flows[i], flows[i + 1]
+    share = position - i
+    if share in (0.0, 1.0):
+        return last if share else first
+    return Flow(first.chute, solve_between(first.solution, last.solution, share))
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,8 +45,8 @@ class BranchEnd(StrEnum):
 class SearchRange:
     """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
 
-    A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
-    proportion to their temperature, and no family ends so. Mass fluxes above ``largest_flux`` are not asked for: a
+    A branch may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
+    proportion to their temperature, and no branch ends so. Mass fluxes above ``largest_flux`` are not asked for: a
     branch may end on its way to them.
     """
 

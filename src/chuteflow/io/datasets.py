@@ -42,9 +42,9 @@ CLASSES: dict[str, tuple[str, dict[int, str]]] = {
     ),
     "exists": ("any flow in the range searched", {0: "no_flow", 1: "flows"}),
     "most": ("largest number of flows that share one mass flux", {}),
-    "families": ("number of families, connected sets of flows", {}),
+    "families": ("number of branches, connected sets of flows", {}),
     "hidden": (
-        "hidden families: more than one, so that a continuation from a known flow does not meet all",
+        "hidden branches: more than one, so that a continuation from a known flow does not meet all",
         {0: "none", 1: "hidden_families"},
     ),
     "interior": ("kinds of interior among the flows", {bit: name for name, bit in INTERIOR_BITS.items()}),
@@ -197,7 +197,7 @@ def _places(found: Sequence[Row]) -> dict[str, Variable]:
     comment = "; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items())
     kinds = [row.special or "none" for row in found]
     return {
-        "branch": Variable(("flow",), branch, {"long_name": "number of the family of flows", "units": "1"}),
+        "branch": Variable(("flow",), branch, {"long_name": "number of the branch of flows", "units": "1"}),
         "special_kind": flags(("flow",), kinds, ("none", *KINDS), "kind of special point", comment),
     }
 

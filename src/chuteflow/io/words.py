@@ -47,7 +47,7 @@ def notes(flows: Sequence[Flow]) -> list[str]:
 
 
 def validity(flows: Sequence[Flow], chute: Chute, scales: Scales | None) -> Iterator[str]:
-    """How far the flows of a family keep to the theory, a line for each stretch of their surface temperatures."""
+    """How far the flows of a branch keep to the theory, a line for each stretch of their surface temperatures."""
     scale = factor("surface_temperature", chute, scales)
     for summary, stretch in groupby(flows, key=lambda flow: flow.validity.summary):
         ends = [flow.surface_temperature * scale for flow in stretch]

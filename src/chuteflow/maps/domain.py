@@ -106,12 +106,12 @@ class Domain(Result):
 
     @cached_property
     def families(self) -> NDArray[np.int16]:
-        """The number of families: connected sets of flows in the range searched."""
+        """The number of branches: connected sets of flows in the range searched."""
         return self._named("families")
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
-        """Whether there are hidden families: more than one, so that no continuation from one flow meets all."""
+        """Whether there are hidden branches: more than one, so that no continuation from one flow meets all."""
         return self._named("families") > 1
 
     @cached_property

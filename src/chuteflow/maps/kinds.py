@@ -1,4 +1,4 @@
-"""What flows a base has on a grid of trajectories: how many, of which kinds, and in how many families."""
+"""What flows a base has on a grid of trajectories: how many, of which kinds, and in how many branches."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chuteflow.trajectories.refining import TrajectoryGrid
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
-#: Turns of ln Q along a family are told apart if they differ by more.
+#: Turns of ln Q along a branch are told apart if they differ by more.
 _TURN = 1e-6
 #: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
@@ -32,7 +32,7 @@ class FlowClasses:
 
     ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
     ``doubtful`` tells whether it would be larger with turns of the flux that are smaller than its uncertainty;
-    ``families`` is the number of families (connected sets of flows); ``interior`` and ``density`` have the bits of
+    ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
     INTERIORS and DENSITIES that are present.
     """
 
@@ -102,7 +102,7 @@ def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
 
 
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> tuple[Array, Array]:
-    """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q, where ``rise`` changes
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, where ``rise`` changes
     sign: of all turns, and of those alone that are larger than ln Q is uncertain."""
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
@@ -156,7 +156,7 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def _confirmed(stops: list[float], rises: float, noise: list[float]) -> list[float]:
-    """Values at the ends and turns of a family without those turns between which it does not turn by more than the
+    """Values at the ends and turns of a branch without those turns between which it does not turn by more than the
     ``noise`` of either.
 
     It ``rises`` first (1), or falls (-1), and so on in turn.

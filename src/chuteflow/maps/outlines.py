@@ -63,7 +63,7 @@ KINDS_OF_BOUNDARIES = {
     "lambda=3": "hot flows end: their base gives more energy than they can lose (closed form)",
     "lambda=0.660": "hot flows turn densest above the base (closed form)",
     "existence": "the first or last flow",
-    "families": "another family of flows",
+    "families": "another branch of flows",
     "multiplicity": "the largest number of flows that share one mass flux",
     "dissipative": "the first or last flow with a dissipative interior",
     "mixed": "the first or last flow with a mixed interior",
@@ -169,8 +169,8 @@ def _around(places: Sequence[float], parts: Sequence[PiecewiseConstant], point: 
 
 def _exists_around(columns: Sequence[Column], point: Point) -> bool:
     """Whether there are flows on all sides of a point."""
-    places, families = _parts(columns, CODES.index("families"))
-    return 0 not in _around(places, families, point)
+    places, branches = _parts(columns, CODES.index("families"))
+    return 0 not in _around(places, branches, point)
 
 
 def _where(points: Sequence[Point], wanted: Callable[[Point], bool]) -> Iterator[list[Point]]:

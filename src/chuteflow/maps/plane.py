@@ -32,7 +32,7 @@ from chuteflow.trajectories.tables import ENTRIES, envelope
 #: for. All but the first two are 1 where there are such flows, else 0.
 CODES = ("most", "families", *INTERIORS, *DENSITIES)
 #: The same in few numbers: whether there are hot flows (1, 0, or -1 where the theory does not say), the numbers of
-#: flows that share one flux and of families, and the bits of the kinds of interior and of density.
+#: flows that share one flux and of branches, and the bits of the kinds of interior and of density.
 SUMMARY = ("hot", "most", "families", "interior", "density")
 #: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
 #: each bound a point is.

@@ -1,4 +1,4 @@
-"""Figure 3: centre of mass, mass hold-up and mass flux along the family of flows at tan(theta) = 0.3."""
+"""Figure 3: centre of mass, mass hold-up and mass flux along the branch of flows at tan(theta) = 0.3."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Figure3:
 
 
 def compute(source: Source = OVERBURDEN) -> Figure3:
-    """The family of flows, and its flows at Q = 3."""
+    """The branch of flows, and its flows at Q = 3."""
     chute = dissipative(SLOPE)
     (traced,) = source.curves([chute], SURFACE_TEMPERATURE, POINTS)
     return Figure3(traced, dict(zip("ABC", source.flows(chute, Q=MASS_FLUX), strict=True)))

@@ -62,7 +62,7 @@ _LINE = 1.1
 
 @style.own_settings()
 def plot_domain(found: Domain) -> Figure:
-    """Two panels: how many flows share one flux, with the bounds of hot flows and hidden families hatched; and the
+    """Two panels: how many flows share one flux, with the bounds of hot flows and hidden branches hatched; and the
     kinds of density and interior, with the bounds of flows at the temperatures asked for."""
     figure, axes = style.panels(2, width=7.6, height=4.7)
     _number_panel(axes[0], found)
@@ -170,7 +170,7 @@ def _label(ax: Axes, found: Domain, values: NDArray[Any], words: dict[int, str])
 
 
 def _key(found: Domain) -> Iterator[Any]:
-    """Entries of the legend: the lines that are there, temperatures, and hidden families."""
+    """Entries of the legend: the lines that are there, temperatures, and hidden branches."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -181,4 +181,4 @@ def _key(found: Domain) -> Iterator[Any]:
     for temperature, stroke in zip(found.plane.temperatures, _strokes(found), strict=True):
         yield Line2D([], [], label=rf"first or last flow at ${_TEMPERATURE} = {temperature:g}$", **stroke.line(_LINE))
     if found.hidden.any():
-        yield Patch(facecolor="none", edgecolor=style.BLACK, hatch="/////", linewidth=0.0, label="hidden families")
+        yield Patch(facecolor="none", edgecolor=style.BLACK, hatch="/////", linewidth=0.0, label="hidden branches")

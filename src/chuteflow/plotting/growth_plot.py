@@ -1,4 +1,4 @@
-"""Pictures of growth rates: shades and contours over a plane of wavenumbers or along a family, with neutral curves."""
+"""Pictures of growth rates: shades and contours over a plane of wavenumbers or along a branch, with neutral curves."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def plot_wave_map(found: WaveMap, *, scales: Scales | None = None) -> Figure:
 
 @style.own_settings()
 def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure:
-    """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
+    """Growth over k h and the temperature along a branch, and the branch with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
     chute = found.flows[0].chute
     rate, heat, flux_scale = (factor(name, chute, scales) for name in ("growth", "surface_temperature", "mass_flux"))
@@ -86,11 +86,11 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
 
 
 def _along(scales: Scales | None) -> str:
-    return f"${NUMBERS['surface_temperature'].latex}${style.unit('surface_temperature', scales)} along the family"
+    return f"${NUMBERS['surface_temperature'].latex}${style.unit('surface_temperature', scales)} along the branch"
 
 
 def _round_places(place: Any, temperature: Any) -> dict[float, str]:
-    """Places along the family at which its surface temperature is a round number, and these numbers.
+    """Places along the branch at which its surface temperature is a round number, and these numbers.
 
     Powers of ten come before others, which stand where there is room, the last ones only while there are few.
     """

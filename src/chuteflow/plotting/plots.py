@@ -224,12 +224,12 @@ def marker(kind: str) -> dict[str, Any]:
 
 
 def _key(curve: Curve) -> Iterator[Any]:
-    """Entries of the legend: families if there are several, the kinds of density and of special points."""
+    """Entries of the legend: branches if there are several, the kinds of density and of special points."""
     from matplotlib.lines import Line2D
 
     if len(curve.branches) > 1:
         for i in range(len(curve.branches)):
-            yield Line2D([], [], label=f"family {i + 1}", **style.LineStyle(_colour(i, curve)).line())
+            yield Line2D([], [], label=f"branch {i + 1}", **style.LineStyle(_colour(i, curve)).line())
     densities = {run.density for branch in curve.branches for run in runs(branch)}
     for density, dashes in style.OF_DENSITY.items():
         if density in densities:

@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow import display
+from chuteflow.branches.paths import flow_between
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
-from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import End, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, scanned
@@ -115,7 +115,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     """The curve with its stability, about two seconds for each sample.
 
     Args:
-        curve: the families of flows of a chute.
+        curve: the branches of flows of a chute.
         samples: flows judged on each branch, evenly along it. A stretch that is shorter than their spacing can be
             missed.
         progress: called with the share of the samples that is done.

@@ -3,7 +3,7 @@
 # notation: z = (a, b) coordinates of the plane, both of order one; sigma eigenvalue of the mode that is followed.
 
 The plane is that of the wavenumbers of one flow, or that of the wavenumber of waves in one direction and the place
-along a family of flows (:mod:`chuteflow.stability.planes`). The curve is that of Re sigma(z) = 0: one equation in two
+along a branch of flows (:mod:`chuteflow.stability.planes`). The curve is that of Re sigma(z) = 0: one equation in two
 unknowns for the general continuation of :mod:`chuteflow.numerics.continuation`, with sigma followed from point to
 point. A scan of the plane says where curves are; each is entered from there. What changes between two grids is the
 error of a point; where that is large the mode has run into the continuous spectrum, and the curve ends.

@@ -1,7 +1,7 @@
 """The planes in which growth rates are mapped and neutral curves followed, and the scans of them.
 
 One is that of the wavenumbers along and across the slope of one flow. The other has the wavenumber of waves in one
-direction, in the logarithm, and the place along a family of flows.
+direction, in the logarithm, and the place along a branch of flows.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
+from chuteflow.branches.paths import flow_between
 from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
-from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import EigenvalueGrid, NeutralCurve, NeutralPlane, neutral_curves
 from chuteflow.stability.verdict import stability_of
@@ -27,7 +27,7 @@ from chuteflow.threads import on_one_thread
 
 #: Called with the share of a scan that is done.
 Progress = Callable[[float], None]
-#: Flows of a family whose operators are kept, for the next point is near.
+#: Flows of a branch whose operators are kept, for the next point is near.
 _KEPT = 8
 _MOST_POINTS, _LARGEST_DEPTH_WAVENUMBER = 400, 100.0
 
@@ -57,7 +57,7 @@ class WavePlane:
 
 @dataclass(frozen=True, eq=False)
 class FamilyPlane:
-    """Waves at one ``angle`` to the slope (radians) on the flows of a family.
+    """Waves at one ``angle`` to the slope (radians) on the flows of a branch.
 
     The first coordinate is (ln k - low) / unit, of k h with h the centre of mass; the second runs from the first to
     the last of ``flows`` by 0 to 1.
@@ -75,11 +75,11 @@ class FamilyPlane:
         return 1.0, 1.0
 
     def named(self, z: Array) -> Array:
-        """k h and the place along the family at points z (n, 2)."""
+        """k h and the place along the branch at points z (n, 2)."""
         return np.stack([np.exp(self.low + self.unit * z[:, 0]), z[:, 1]], axis=1)
 
     def flow(self, place: float) -> Flow:
-        """The flow at a place between 0 and 1 along the family, or a little outside."""
+        """The flow at a place between 0 and 1 along the branch, or a little outside."""
         return self._at(place).flow
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
@@ -149,11 +149,11 @@ class WaveMap(Result):
 
 @dataclass(frozen=True, eq=False)
 class FamilyMap(Result):
-    """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a family.
+    """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a branch.
 
     ``depth_wavenumber`` (m,) is k h with h the centre of mass, and ``flows`` (n) are those of the columns. NaN,
     ``grows`` and ``unresolved`` (m, n) are as in :class:`WaveMap`, with the ``smallest_rate`` (n) of each flow. Of each
-    of the ``neutral`` curves, z (k, 2) is k h and the place along the family from 0 to 1, the error is that of
+    of the ``neutral`` curves, z (k, 2) is k h and the place along the branch from 0 to 1, the error is that of
     ln(k h), and ``neutral_flows`` has the flows.
     """
 
@@ -244,13 +244,13 @@ def family_map(
     size: tuple[int, int] = (24, 24),
     progress: Progress = _silent,
 ) -> FamilyMap:
-    """Growth rates of waves in one direction along a family of flows, with the neutral curves.
+    """Growth rates of waves in one direction along a branch of flows, with the neutral curves.
 
     Args:
         flows: neighbouring flows of one branch of :func:`chuteflow.curve`, in order.
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
-        size: points along k h, evenly in the logarithm, and along the family; about 20 ms each.
+        size: points along k h, evenly in the logarithm, and along the branch; about 20 ms each.
         progress: called with the share that is done.
 
     Raises:
@@ -258,7 +258,7 @@ def family_map(
     """
     _check_size(size)
     if len(flows) < 2:
-        raise InputError(f"{len(flows)} flow: a family needs at least 2")
+        raise InputError(f"{len(flows)} flow: a branch needs at least 2")
     angle = number("angle", angle)
     if not 0.0 <= angle <= 90.0:
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")

@@ -49,7 +49,7 @@ class SolverStatus(Enum):
 
 @dataclass(frozen=True)
 class Condition:
-    """Which flow of a family: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
+    """Which flow of a branch: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
 
     weights: tuple[float, float, float, float]
     value: float

@@ -32,7 +32,7 @@ from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 _PER_DECADE = 4
 #: Accuracy of the columns, and for those whose first flow lies above the start.
 _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
-#: Flows kept of a column; a chute with more is left to the search by families.
+#: Flows kept of a column; a chute with more is left to the search by branches.
 _MOST = 12
 #: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
@@ -292,7 +292,7 @@ def _unlinked(
 def _turning(
     columns: ScannedFlows, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
 ) -> NDArray[np.bool_]:
-    """The gaps, after the columns ``left``, in which the quantity may turn along a family so near to its value that it
+    """The gaps, after the columns ``left``, in which the quantity may turn along a branch so near to its value that it
     passes it between columns without a change of sign, or more than once with one."""
     step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
     # Of all gaps in order, those between members missing.
@@ -357,7 +357,7 @@ class FlowsInBrackets:
         self._gradient = np.zeros((3, brackets.member.size))
 
     def gradient(self, which: Indices) -> Array:
-        """d (ln Q, ln h, ln M)/d ln T_surface along the family, (3, m)."""
+        """d (ln Q, ln h, ln M)/d ln T_surface along the branch, (3, m)."""
         return self._gradient[:, which]
 
     def at(self, which: Indices, log_t: Array, accuracy: Accuracy) -> Flows:

@@ -100,7 +100,7 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
 def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
     """The members on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
 
-    Given surface temperatures are followed down one by one, so that no family of flows has to be found; a given hold-up
+    Given surface temperatures are followed down one by one, so that no branch of flows has to be found; a given hold-up
     need not be followed further.
     """
     if study.condition == "T_surface":

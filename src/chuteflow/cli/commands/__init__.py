@@ -3,7 +3,7 @@
 #: Names and short descriptions, so that the list of commands is printed without importing any.
 COMMANDS = {
     "solve": "The steady flows of a chute at a flux, hold-up, centre of mass or temperature.",
-    "curve": "The families of flows of a chute, with folds and other special points.",
+    "curve": "The branches of flows of a chute, with folds and other special points.",
     "boundary": "Folds, onsets of density inversion and changes of interior through a second parameter.",
     "domain": "Where flows exist, how many and of which kind, over two parameters.",
     "hot": "The hot, dilute flow of a chute: scaling laws, existence and its range of slopes.",
@@ -21,7 +21,7 @@ COMMANDS = {
     "explore": "A page in the browser: drag every parameter, and see the flows.",
     "stability": "Which flows are stable, and the disturbance that grows fastest.",
     "growth": "Growth rates of a flow over wavenumbers along and across the slope, and its neutral curves.",
-    "neutral": "Growth of waves in one direction along a family of flows, and the neutral curves.",
+    "neutral": "Growth of waves in one direction along a branch of flows, and the neutral curves.",
     "dem": "Simulate the grains of a chute one by one with LAMMPS, and measure the flow.",
     "compare": "Compare a simulated or measured flow with the flows and laws of the theory.",
     "relax": "Follow a disturbed flow in time, to the steady flow that it comes to.",

@@ -145,7 +145,7 @@ def _report(found: BoundarySet, second: str, scales: Scales | None) -> Iterator[
     if found.incomplete:
         yield f"there may be more: {found.incomplete}"
     if found.skipped:
-        yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
+        yield f"not entered, since branches could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 
 
 def _points(boundary: Boundary, second: str, scales: Scales | None) -> str:

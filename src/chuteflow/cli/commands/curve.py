@@ -1,4 +1,4 @@
-"""``chuteflow curve``: every family of flows of a chute, with its special points."""
+"""``chuteflow curve``: every branch of flows of a chute, with its special points."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6
 @click.command("curve", help=COMMANDS["curve"], epilog=_EPILOG)
 @options.chute_options
 @options.option("--points", type=click.INT, help="Flows on the longest branch; 200 by default.")
-@click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
-@options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
+@click.option("--stability", is_flag=True, help="Judge flows along each branch, and mark where stability changes.")
+@options.option("--samples", type=click.INT, help="Flows judged on each branch with --stability; 24 by default.")
 @options.search_options
 @options.output_options()
 def command(**given: Any) -> None:
@@ -88,7 +88,7 @@ def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scale
         yield words.scales(scales)
     for i, branch in enumerate(found.branches, 1):
         yield ""
-        yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
+        yield f"branch {i} of {len(found.branches)}, {len(branch.flows)} flows"
         yield _points(branch, found, scales)
         yield from words.validity(branch.flows, found.chute, scales)
         if judged is not None:
@@ -105,7 +105,7 @@ def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scale
 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
-    """Stable and unstable stretches of a family in words."""
+    """Stable and unstable stretches of a branch in words."""
     from chuteflow.io.stability_curve import change_words, stretch
 
     said = [stretch(run, found.chute, scales) for run in branch.runs]

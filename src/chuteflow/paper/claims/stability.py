@@ -10,7 +10,7 @@ from chuteflow.paper.claims.shared import SLOPE, named_flows
 from chuteflow.paper.materials import dissipative
 from chuteflow.stability.budget import ModeBudget, energy_budget
 
-#: Surface temperatures of the family of figure 3 that stand for it beside flows A and C, hot to cold.
+#: Surface temperatures of the branch of figure 3 that stand for it beside flows A and C, hot to cold.
 _WARMTH = (20.0, 1.7, 1.2, 0.5)
 #: A flow of a sample of chutes, steep and far from elastic, and its surface temperature.
 _STEEP = Chute(0.568, 0.627, 0.478, 0.847), 9.9
@@ -86,7 +86,7 @@ def stable_in_a_small_part() -> Finding:
         "a small part",
         kinds,
         holds=0 < len(stable) < 0.5 * len(kinds),
-        reason=f"{len(stable)} of {len(kinds)} flows of the family of figure 3 are stable, those in its middle: hotter "
+        reason=f"{len(stable)} of {len(kinds)} flows of the branch of figure 3 are stable, those in its middle: hotter "
         "ones are unstable across the slope, colder ones along it. Of a random sample of 82 flows 13 are stable.",
     )
 
@@ -106,7 +106,7 @@ def inversion_and_stability() -> Finding:
         "no correlation",
         seen,
         holds=len(seen) == 4,
-        reason="Along the family of figure 3 alone there are stable and unstable flows with and without a density "
+        reason="Along the branch of figure 3 alone there are stable and unstable flows with and without a density "
         "inversion: neither implies the other. In a random sample of 82 flows fewer of the inverted ones are stable, 1 "
         "of 22, than of the others, 12 of 60, which hints at a weak trend.",
     )

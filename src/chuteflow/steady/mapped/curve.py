@@ -46,7 +46,7 @@ class MappedPoint:
 
 @dataclass(frozen=True, eq=False)
 class MappedCurve:
-    """A family of flows in order along its curve, from hot to cold at the start.
+    """A branch of flows in order along its curve, from hot to cold at the start.
 
     All are converged to TOLERANCE. ``special`` are the flows of turning mass flux and at the onset of a density
     inversion, in the same order; ``ends`` says in words why the curve ends at either side.
@@ -88,10 +88,10 @@ def mapped_curve(
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     control: ContinuationSettings = CONTROL,
 ) -> MappedCurve:
-    """The family through ``start``, to both sides, as far as it goes in a range of T_surface.
+    """The branch through ``start``, to both sides, as far as it goes in a range of T_surface.
 
     Args:
-        start: a flow of the family.
+        start: a flow of the branch.
         surface_temperature: lowest and highest T_surface; the last flow of a side is the first one outside.
         control: how the curve is followed.
 

@@ -31,7 +31,7 @@ What is unknown, and what determines it:
   coefficients: 2N+5 unknowns. Equations: 2N at the nodes, (3.17), the normal stress (3.31) and the heat flux
   (3.32) at zeta = 0, and (3.26): 2N+4.
 
-One equation is missing on purpose: flows form families. A condition on Q, h, M or T singles out a flow; without
+One equation is missing on purpose: flows form branches. A condition on Q, h, M or T singles out a flow; without
 one the system is ready for continuation, through folds of Q.
 """
 
@@ -585,7 +585,7 @@ def solve_mapped(
     Args:
         chute: the chute, which may differ from that of ``start`` in all but the surface.
         start: a flow to start from.
-        condition: which flow of the family.
+        condition: which flow of the branch.
         degree: N of (3.28), at least 4.
         multiple: k of (3.30), by default that of :func:`best_multiple` for ``start``.
 

@@ -66,7 +66,7 @@ _REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class SolutionBranch:
     """A branch of flows in a range: rough flows in order, of which any are solved on request.
 
     ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3. ``pieces`` are short branches near to this one which
@@ -180,7 +180,7 @@ class Family:
             inner.pop()
         return refined([first, *inner, last], tolerance)
 
-    def traced(self, tolerance: float) -> list[TracedFamily]:
+    def traced(self, tolerance: float) -> list[TracedBranch]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
         if len(inside) < 2:
@@ -202,7 +202,7 @@ class Family:
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
         return [
-            TracedFamily(tuple(piece), (begin, end))
+            TracedBranch(tuple(piece), (begin, end))
             for piece, begin, end in zip(pieces, ends[::2], ends[1::2], strict=True)
             if len(piece) > 1
         ]
@@ -227,9 +227,9 @@ class Family:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def families(model: Model, within: SearchRange) -> tuple[Family, ...]:
+def find_branches(model: Model, within: SearchRange) -> tuple[SolutionBranch, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
-    found = [Family(branch, within) for branch in search(model, within).branches if len(branch) > 1]
+    found = [SolutionBranch(branch, within) for branch in search(model, within).branches if len(branch) > 1]
     pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
     separate = [True] * len(found)
     for i, short in enumerate(found):
@@ -292,19 +292,19 @@ def _place(macroscopic: Array) -> str:
 
 
 def crossings(
-    family: Family, which: int, value: float, tolerance: float = TOLERANCE
+    branch: SolutionBranch, which: int, value: float, tolerance: float = TOLERANCE
 ) -> tuple[list[Solution], list[Array]]:
     """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
     that were seen and could not be solved."""
     target = float(np.log(value))
-    m = family.macroscopic
+    m = branch.macroscopic
     off = m[:, which] - target
-    near = np.abs(off) < _doubt_of(off, family.arclength)
+    near = np.abs(off) < _doubt_of(off, branch.arclength)
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
-    near[_turns_near(off, family.arclength)] = True
+    near[_turns_near(off, branch.arclength)] = True
     crossed: list[tuple[int, Array]] = []
-    for place, piece in family.pieces:
+    for place, piece in branch.pieces:
         there = piece[:, which] - target
         if np.abs(there).min() < _NEAR_TURN or (there >= 0.0).any() != (off[place] >= 0.0):
             near[place] = True
@@ -312,11 +312,11 @@ def crossings(
             crossed.append((place, piece))
     found: list[Solution] = []
     lost: list[Array] = []
-    for begin, end in _runs(near, family.arclength):
-        single = _solve_single(family, which, target, off, begin, end, tolerance)
-        solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
+    for begin, end in _runs(near, branch.arclength):
+        single = _solve_single(branch, which, target, off, begin, end, tolerance)
+        solved = [single] if single is not None else _solve_among(branch, which, target, begin, end, tolerance)
         if solved is None:
-            if family.separate:
+            if branch.separate:
                 lost += [m[i] for i in changes.tolist() if begin <= i < end]
             lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
         found += solved or []
@@ -378,23 +378,23 @@ def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
 
 
 def _solve_single(
-    family: Family, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
+    branch: SolutionBranch, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
 ) -> Solution | None:
     """The one flow among rough flows along which the quantity rises or falls steeply; None where it may turn."""
     change = np.flatnonzero((off[begin:end] >= 0.0) != (off[begin + 1 : end + 1] >= 0.0))
-    slopes = _slopes(off, family.arclength, begin, end)
+    slopes = _slopes(off, branch.arclength, begin, end)
     if len(change) != 1 or not (np.abs(slopes) > _STEEP).all() or not ((slopes > 0.0).all() or (slopes < 0.0).all()):
         return None
     i = begin + int(change[0])
     nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
     weights = np.zeros(4)
     weights[which] = 1.0
-    point = point_at(family.rough.start(nearer), weights, target, tolerance)
+    point = point_at(branch.rough.start(nearer), weights, target, tolerance)
     if point is None or abs(point.tangent[which]) < 0.5 * np.abs(slopes).min():
         return None
     fraction = off[i] / (off[i] - off[i + 1])
-    there = family.macroscopic[i] + fraction * (family.macroscopic[i + 1] - family.macroscopic[i])
-    spacing = family.arclength[i + 1] - family.arclength[i]
+    there = branch.macroscopic[i] + fraction * (branch.macroscopic[i + 1] - branch.macroscopic[i])
+    spacing = branch.arclength[i + 1] - branch.arclength[i]
     wrong = float(np.linalg.norm(point.m - there))
     sure = wrong < _ROUGH + _ASTRAY * spacing and np.abs(slopes).min() * max(_OVER, spacing) > _SURELY * abs(
         float((point.m - there)[which] - point.tangent[which] * ((point.m - there) @ point.tangent))
@@ -411,14 +411,14 @@ def _slopes(off: Array, arclength: Array, begin: int, end: int) -> Array:
 
 
 def _solve_among(
-    family: Family, which: int, target: float, begin: int, end: int, tolerance: float
+    branch: SolutionBranch, which: int, target: float, begin: int, end: int, tolerance: float
 ) -> list[Solution] | None:
     """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
     pieces. None where they are not found."""
-    length = family.arclength
+    length = branch.arclength
     for _ in range(2):
         try:
-            points = family.points(begin, end, which, target, tolerance)
+            points = branch.points(begin, end, which, target, tolerance)
             return _on_path(points, which, target, tolerance)
         except SolveError:
             begin = max(int(np.searchsorted(length, length[begin] - _FURTHER)) - 1, 0)
@@ -490,7 +490,7 @@ def _between(chord: Chord, which: int, target: float) -> Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class TracedFamily:
+class TracedBranch:
     """A branch as far as it goes within a range: solved ``points`` in order, which suffice to know it between them.
 
     ``ends`` says in words why it ends at either side; a loop ends with its first flow.
@@ -533,19 +533,19 @@ class TracedFamily:
         return out
 
 
-def traced_families(model: Model, within: SearchRange, tolerance: float = 1e-8) -> list[TracedFamily]:
+def trace_branches(model: Model, within: SearchRange, tolerance: float = 1e-8) -> list[TracedBranch]:
     """Every branch of flows in the range, solved from end to end."""
     return trace_all(model, within, tolerance)[0]
 
 
-def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
+def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list[TracedBranch], list[Array]]:
     """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
-    found: list[TracedFamily] = []
+    found: list[TracedBranch] = []
     lost: list[Array] = []
-    for family in families(model, within):
-        pieces = family.traced(tolerance)
+    for branch in find_branches(model, within):
+        pieces = branch.traced(tolerance)
         found += pieces
-        inside = [m for m in family.macroscopic if within.contains(m)]
-        if len(inside) > 1 and not pieces and family.separate:
+        inside = [m for m in branch.macroscopic if within.contains(m)]
+        if len(inside) > 1 and not pieces and branch.separate:
             lost.append(inside[len(inside) // 2])
     return found, lost
