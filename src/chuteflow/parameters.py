@@ -20,7 +20,7 @@ class Parameter:
     ``name`` is the argument of :class:`chuteflow.Chute`, ``key`` the name in JSON, in studies and on the command line;
     ``noun``, ``symbol`` and ``latex`` its notation, ``label`` what messages call it. It is from ``low`` to ``high``, as
     ``allowed`` says in short and ``rule`` in full; a value that is above ``high`` by no more than ``rounding`` is taken
-    for it. ``of_base`` tells whether it belongs to the base alone. All parameters are dimensionless.
+    for it. ``of_base`` is whether it belongs to the base alone. All parameters are dimensionless.
     """
 
     name: str

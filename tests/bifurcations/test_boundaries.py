@@ -249,7 +249,7 @@ def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, sec
     [
         ({"of": "fold-h"}, "cannot follow 'fold-h': choose one of fold-Q"),
         ({"second": "surface"}, "unknown second parameter 'surface': choose one of slope"),
-        ({"bounds": (0.4, 0.3)}, "the range must rise"),
+        ({"bounds": (0.4, 0.3)}, "the range must increase"),
         ({"bounds": (-0.1, 0.3)}, "slope"),
         ({"samples": 1}, "samples = 1: must be from 2 to 1000"),
         ({"tolerance": 1.0}, "tolerance 1: must be from"),

@@ -242,7 +242,7 @@ def test_bands_narrower_than_can_be_resolved_are_left_out():
         ({"workers": 0}, "workers"),
         ({"y": ("slope", 0.1, 0.2)}, "both axes"),
         ({"y": ("roughness", 0.1, 0.6)}, "roughness"),
-        ({"y": ("roughness", 0.6, 0.5)}, "must rise"),
+        ({"y": ("roughness", 0.6, 0.5)}, "must increase"),
         ({"y": ("rough", 0.5, 0.6)}, "unknown parameter"),
         ({"largest_holdup": -1.0}, "hold-up"),
     ],

@@ -29,7 +29,7 @@ MOST_CHECKED = 400
 
 @dataclass(frozen=True)
 class Peak:
-    """The highest point of a map, the summit near by, and how many points could not be told."""
+    """The highest point of a map, the summit near by, and how many points could not be resolved."""
 
     growth: float
     kx: float

@@ -36,7 +36,7 @@ from chuteflow.threads import on_one_thread
 KINDS = seeds.KINDS
 #: Values of the parameter at which boundaries are entered, unless another number is asked for.
 SAMPLES = 13
-#: A value at which branches cannot be told apart is moved by so many spacings, in turn.
+#: A value at which branches cannot be distinguished is moved by so many spacings, in turn.
 _ASIDE = (0.0, 0.07, -0.11)
 
 
@@ -107,7 +107,7 @@ class BoundarySet(Result, Sequence[Boundary]):
 
     ``chute`` gives the other parameters; ``bounds`` is the range of the ``second``, ``sampled`` the values of it at
     which boundaries were entered, and ``families`` those of the flows there. ``skipped`` are the values at which
-    branches could not be told apart. ``reason`` says why there is none.
+    branches could not be distinguished. ``reason`` says why there is none.
 
     Complete is this: every boundary is found that passes a sampled value on a branch in the range searched, and
     is followed from end to end. One that begins and ends between two sampled values is looked for from both,
@@ -231,7 +231,7 @@ def boundary(
             if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", share)
                 line = traced(point, within, tolerance, control, notice)
-                # A point that could not be told from those of a known line has led to it once more.
+                # A point that could not be distinguished from those of a known line has led to it once more.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]
 
@@ -281,14 +281,14 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
         if end.surface == "free":
             require_limit(end.law, end.restitution, end.slope, "boundaries need")
     if not low < high:
-        raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")
+        raise InputError(f"{second} from {low:g} to {high:g}: the range must increase")
     return sweep
 
 
 def _branches_at(
     sweep: SecondParameter, value: float, spacing: float, within: SearchRange
 ) -> tuple[list[TracedBranch] | None, float]:
-    """The branches of flows at a value of the parameter, or close by where they cannot be told apart just there."""
+    """The branches of flows at a value of the parameter, or close by where they cannot be distinguished just there."""
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))
         try:

@@ -183,7 +183,7 @@ class Inversion(_OfFields):
 
 @dataclass(frozen=True, eq=False)
 class InteriorChange(_OfFields):
-    """Change of interior: dissipation less production, over nu p sqrt(T), is 0 where it is least or ``largest``.
+    """Change of interior: dissipation minus production, over nu p sqrt(T), is 0 where it is least or ``largest``.
 
     The flow turns mixed there: from dissipative where the least falls below 0, from productive where the largest
     rises above it. The place is the densest, or one inside, or the surface; where it passes from one of the first

@@ -17,7 +17,7 @@ from chuteflow.steady.quantities import PLACE
 
 #: Kinds of flows are told beside this fraction of the length of a boundary.
 _FRACTION = 0.45
-#: Regions are told apart on so many cells by as many, and counted if a circle of so many cells fits in.
+#: Regions are distinguished on so many cells by as many, and counted if a circle of so many cells fits in.
 _CELLS, _FITTING = 300, 7.0
 #: Room around the boundaries, as a fraction of their extent.
 _MARGIN = 0.03

@@ -34,7 +34,7 @@ _SINGULAR = 1e-5
 _BESIDE, _SAME = 0.3, 1e-6
 #: To tell whether points are the same they are solved to this; where even that fails, what lies within this part of a
 #: chord's length beside it is on the line; and so many points of a line tell whether it is a known one.
-_TOLD, _ON_CHORD, _TELLING = 1e-7, 1e-3, 5
+_ROUGHLY, _ON_CHORD, _SAMPLED = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
 #: A parameter that changes less, per arclength, does not change.
@@ -73,8 +73,8 @@ class TracedBoundary:
 
     def repeats(self, other: TracedBoundary) -> bool:
         """Whether this is a part of another boundary, or the whole of it."""
-        some = np.linspace(0, len(self.points) - 1, _TELLING + 2)[1:-1].round().astype(int)
-        return sum(other.holds(self.points[i]) for i in some.tolist()) > _TELLING // 2
+        some = np.linspace(0, len(self.points) - 1, _SAMPLED + 2)[1:-1].round().astype(int)
+        return sum(other.holds(self.points[i]) for i in some.tolist()) > _SAMPLED // 2
 
     def at(self, value: float, tolerance: float) -> list[BoundaryPoint]:
         """The points at which the parameter has a ``value``, in order.
@@ -101,7 +101,7 @@ class TracedBoundary:
         system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
-            there = solved(system, w, row, float(row @ point.w[-3:]), _TOLD)
+            there = solved(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
         except SolveError:
             return close
         gap = there.flow.solution.macroscopic - point.flow.solution.macroscopic

@@ -41,8 +41,8 @@ def imbalance(model: Model) -> str:
     if net.max() <= 0.0 and base.min() >= 0.0:
         if chute.restitution == 1.0:
             return (
-                "elastic grains lose no energy inside, so that only flows are left whose base takes it, "
-                "and this base gives energy at every density: lower e_w or the slope"
+                "elastic grains lose no energy inside, so that only flows with a base that takes energy "
+                "remain, and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
     if model.beta != 0.0 or model.base != BASES["richman"]:

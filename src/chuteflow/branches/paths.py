@@ -32,7 +32,8 @@ _CLOSEST, _MOST_BETWEEN = 1e-9, 200
 #: A slope along the branch is known between two points to this fraction of what it changes, before points between them
 #: have shown better, which is trusted down to the second; below the third a change of sign is a single one.
 _UNKNOWN, _SUREST, _KNOWN = 0.5, 1e-3, 0.1
-#: A slope that is smaller, per length, cannot be told from 0; turning points closer than the second are not told apart.
+#: A slope that is smaller, per length, cannot be distinguished from 0; turning points closer than the second are not
+#: distinguished.
 _FLAT, _SHORTEST = 1e-7, 1e-4
 #: Where a quantity takes a value is known when sigma is to this, or the quantity to the second.
 _CLOSE, _ROUNDING = 1e-12, 4e-15
@@ -205,8 +206,9 @@ def turns(points: Sequence[PathPoint], which: int, tolerance: float = TOLERANCE)
     """The points at which a quantity turns along successive ``points`` that suffice, in order.
 
     Its slope is known exactly at the points. Between two it is a quadratic of them and of the quantity's change, and
-    what that may be wrong by shows where a point is put between. A stretch is halved until the slope has one sign, or
-    a change of sign at its ends and none of its own derivative. Slopes too small to be told from zero turn nothing.
+    what that may be wrong by shows where a point is put between. A stretch is halved until the slope has one sign, or a
+    change of sign at its ends and none of its own derivative. Slopes too small to be distinguished from zero turn
+    nothing.
     """
     found = []
     for i in range(len(points) - 1):

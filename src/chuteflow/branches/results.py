@@ -44,7 +44,7 @@ class FlowSet(Result, Sequence[Flow]):
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
     ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where there
     may be more: where a branch leaves the range searched towards what was asked for, a flow that was seen could not be
-    solved, or the search does not tell; None otherwise.
+    solved, or the search leaves it open; None otherwise.
     """
 
     chute: Chute
@@ -188,7 +188,7 @@ class Branch(Result, LineOfFlows):
 @dataclass(frozen=True, eq=False)
 class Curve(Result):
     """All branches of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
-    where there may be more: where a branch was seen and not solved, or the search does not tell."""
+    where there may be more: where a branch was seen and not solved, or the search leaves it open."""
 
     chute: Chute
     branches: tuple[Branch, ...]

@@ -340,7 +340,9 @@ def plot_options(what: str) -> Callable[[Command], Command]:
             metavar="FILE",
             help=f"Draw {what}{' ' if what else ''}into FILE: .png, .pdf or .svg, or several as in flows.png,pdf.",
         ),
-        option("--theme", metavar="NAME", help="Look of the picture: print (the default) or slides, with larger text."),
+        option(
+            "--theme", metavar="NAME", help="Style of the picture: print (the default) or slides, with larger text."
+        ),
     )
 
 
@@ -454,7 +456,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
     known = given["grains"]
     for name in ("diameter", "density"):
         if name not in texts and name not in known:
-            also = "; a --chute file or a --case of `chuteflow cases` may say them too" if given["si"] else ""
+            also = "; a --chute file or a --case of `chuteflow cases` may give them too" if given["si"] else ""
             raise InputError(f"SI units need --diameter and --density: --{name} is missing{also}")
     from chuteflow.io.units import read_si
     from chuteflow.steady.quantities import Scales
@@ -511,9 +513,7 @@ def own(given: Mapping[str, Any], name: str, quantity: str, slope: float | None,
     if not isinstance(typed, NumbersWithUnit):
         return typed
     if slope is None:
-        raise InputError(
-            f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: leave the unit away"
-        )
+        raise InputError(f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: omit the unit")
     from chuteflow.io.units import read_amount
 
     values = [read_amount(_written(name), f"{one} {typed.unit}", quantity, scales, slope) for one in typed.texts]

@@ -55,7 +55,7 @@ _NEAR = 0.05
 class Estimate:
     """One parameter: its value, standard error and confidence interval.
 
-    ``determined`` tells whether the data end the interval on both sides.
+    ``determined`` is whether the data end the interval on both sides.
     """
 
     key: str
@@ -77,8 +77,8 @@ class Estimate:
         if self.interval.open:
             return f"the data do not determine {self.key}: all values from {low} to {high} fit"
         if self.interval.ends[0] == "crossed":
-            return f"{self.key} is above {low}: the data do not say by how much"
-        return f"{self.key} is below {high}: the data do not say by how much"
+            return f"{self.key} is above {low}: the data do not determine by how much"
+        return f"{self.key} is below {high}: the data do not determine by how much"
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,7 @@ def fit(
             best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST, tolerance=_CLOSELY)
             best = best or found.found
     else:
-        raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
+        raise SolveError("the fit keeps improving without converging: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
 
 

@@ -61,7 +61,7 @@ def dataset(result: Any, scales: Scales | None = None) -> Dataset:
     Raises:
         InputError: for what is no result, or cannot take SI units.
     """
-    raise InputError(f"a {type(result).__name__} is no table: take a result of which there are several numbers")
+    raise InputError(f"a {type(result).__name__} is no table: take a result with several numbers")
 
 
 # Flows
@@ -170,7 +170,7 @@ def flow_variables(found: Sequence[Row], scales: Scales | None) -> dict[str, Var
 
 
 def _validity(flows: Sequence[Flow]) -> dict[str, Variable]:
-    """Numbers that tell how far flows keep to the theory, and a bit for each limit that is passed."""
+    """Numbers that show how far flows keep to the theory, and a bit for each limit that is passed."""
     known = [flow.validity for flow in flows]
     numbers = {
         name: Variable(
@@ -307,7 +307,7 @@ def _along_boundaries(boundaries: Sequence[Boundary], second: str, scales: Scale
 @dataset.register(Domain)
 def _of_domain(result: Domain, scales: Scales | None = None) -> Dataset:
     if scales is not None:
-        raise InputError("a domain has no units: take it without scales")
+        raise InputError("a domain has no units: omit scales")
     plane = result.plane
     x, y = plane.x.name, plane.y.name
     variables = {
@@ -408,7 +408,7 @@ def _of_family(result: FamilyMap, scales: Scales | None = None) -> Dataset:
 def _growth(
     dimensions: tuple[str, str], found: WaveMap | FamilyMap, chute: Chute, scales: Scales | None
 ) -> dict[str, Variable]:
-    """Growth and frequency over two dimensions; NaN where none is told."""
+    """Growth and frequency over two dimensions; NaN where none is resolved."""
     known = np.where(found.unresolved, "not_known", np.where(found.grows, "grows", "does_not_grow"))
     meanings = ("does_not_grow", "grows", "not_known")
     state = flags(dimensions, known.ravel().tolist(), meanings, "whether a disturbance grows")
@@ -427,7 +427,7 @@ def _growth(
 def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
     chute, mode = result.flow.chute, result.mode
     numbers = {name: getattr(result.flow, name) * factor(name, chute, scales) for name in PLACE}
-    told = {} if mode is None else {"kx": mode.kx, "ky": mode.ky, "growth": mode.growth, "frequency": mode.frequency}
+    rates = {} if mode is None else {"kx": mode.kx, "ky": mode.ky, "growth": mode.growth, "frequency": mode.frequency}
     scale: dict[str, str] = {"kx": "wavenumber", "ky": "wavenumber"}
     known = {True: "stable", False: "unstable", None: "not_known"}[result.stable]
     return Dataset(
@@ -445,7 +445,7 @@ def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
                     f"{name} of the mode that grows fastest",
                     _unit(scale.get(name, name), scales),
                 )
-                for name, value in told.items()
+                for name, value in rates.items()
             },
         },
         chute.as_dict(),

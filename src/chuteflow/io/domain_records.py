@@ -198,7 +198,7 @@ def _part_from(stops: Any, values: Any) -> PiecewiseConstant:
 def _shares_from(kept: Any) -> tuple[float, ...]:
     found = tuple(number("a share of an axis", share, 0.0, 1.0) for share in kept)
     if any(one >= two for one, two in pairwise(found)):
-        raise InputError("shares of an axis must rise")
+        raise InputError("shares of an axis must increase")
     return found
 
 

@@ -24,7 +24,7 @@ LABELS = {
 
 
 def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
-    """The judged flows of each branch: their place, whether they are stable, and the mode that grows fastest.
+    """The examined flows of each branch: their place, whether they are stable, and the mode that grows fastest.
 
     ``stable`` is null where it is not known.
     """

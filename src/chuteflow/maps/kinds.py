@@ -18,7 +18,7 @@ from chuteflow.trajectories.refining import TrajectoryGrid
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
-#: Turns of ln Q along a branch are told apart if they differ by more.
+#: Turns of ln Q along a branch are distinguished if they differ by more.
 _TURN = 1e-6
 #: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
@@ -30,8 +30,8 @@ _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 class FlowClasses:
     """The flows of one chute in the range searched.
 
-    ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
-    ``doubtful`` tells whether it would be larger with turns of the flux that are smaller than its uncertainty;
+    ``at`` is whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
+    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty;
     ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
     INTERIORS and DENSITIES that are present.
     """

@@ -67,7 +67,7 @@ class ParameterAxis:
             object.__setattr__(self, end, number(self.name, getattr(self, end)))
         object.__setattr__(self, "high", PARAMETERS[self.name].rounded(self.high))
         if not self.low < self.high:
-            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
+            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must increase")
 
     def at(self, share: Any) -> Any:
         """The value (or values) at a share of the range, 0 to 1."""

@@ -33,7 +33,7 @@ _SOUND = 3.0
 #: Zeros are near to each other within this share of the distances around.
 _NEAR = 0.3
 #: Surface temperatures of neighbours tell them apart if their logarithms differ by more.
-_TOLD = 1e-7
+_DISTINCT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     bounds[:, ::3] = np.minimum(bounds[:, ::3], net[:, None])
     bounds[:, 1::3] = np.maximum(bounds[:, 1::3], net[:, None])
     bounds[:, 2::3] = np.maximum(bounds[:, 2::3], curving[:, None])
-    scattered = across & (np.abs(grid.states[ends[:, 1], S_T] - grid.states[ends[:, 0], S_T]) < _TOLD)
+    scattered = across & (np.abs(grid.states[ends[:, 1], S_T] - grid.states[ends[:, 0], S_T]) < _DISTINCT)
     return Zeros(grid, log_q, log_m, log_t, rise, bounds, doubt, scattered)
 
 
@@ -195,8 +195,8 @@ def _labels(grid: TrajectoryGrid, around: Index) -> tuple[Array, NDArray[np.bool
     place = np.where(big_l > DILUTE, big_l, DILUTE + DILUTE_WEIGHT * (big_l - DILUTE))
     apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / grid.scale)
     gaps = np.diff(state[..., S_T], axis=1)
-    told = (gaps > _TOLD).all(axis=1, keepdims=True)
-    gaps = np.where(told, gaps, np.maximum(apart, 1e-14))
+    resolved = (gaps > _DISTINCT).all(axis=1, keepdims=True)
+    gaps = np.where(resolved, gaps, np.maximum(apart, 1e-14))
     joined = apart < _APART * grid.refinement.delta
     labels = np.concatenate([np.zeros((len(around), 1)), np.cumsum(gaps, axis=1)], axis=1)
     return labels, joined

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from chuteflow.stability.planes import FamilyMap, WaveMap
 
-#: Shades of growth on either side of zero, and the largest decay that is told from the rest, over the largest growth.
+#: Shades of growth on either side of zero, and the largest decay that is distinguished from the rest, over the largest
+#: growth.
 _SHADES, _DEEPEST = 8, 2.0
 #: First digits of round numbers, the roundest first; others are for axes with fewer ticks than these.
 _DIGITS, _ROUNDEST, _FEW = (1, 2, 5, 3, 7, 4, 6, 8, 9), (1, 2, 5), 3
@@ -111,22 +112,23 @@ def _round_places(place: Any, temperature: Any) -> dict[float, str]:
 
 
 def _hatched(growth: Any) -> str:
-    return "" if np.isfinite(growth).all() else "; hatched: no mode told"
+    return "" if np.isfinite(growth).all() else "; hatched: no mode resolved"
 
 
 def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any, scales: Scales | None) -> None:
-    """Shades that are white at zero growth, hatches where no mode is told, and crosses where growth is not known."""
+    """Shades that are white at zero growth, hatches where no mode is resolved, and crosses where growth is not
+    known."""
     from matplotlib.patches import Rectangle
     from matplotlib.ticker import MaxNLocator
 
-    told = np.isfinite(growth)
-    if not told.all():
+    resolved = np.isfinite(growth)
+    if not resolved.all():
         unit = Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, zorder=0.0, facecolor="white")
         unit.set(hatch="////", edgecolor=style.GREY, linewidth=0.0)
         ax.add_patch(unit)
         for i, j in np.argwhere(unresolved):
             ax.plot(x[i], y[j], marker="x", markersize=4.0, color=style.GREY, clip_on=False, linestyle="none")
-    if not (told[1:, 1:] & told[:-1, 1:] & told[1:, :-1] & told[:-1, :-1]).any():
+    if not (resolved[1:, 1:] & resolved[:-1, 1:] & resolved[1:, :-1] & resolved[:-1, :-1]).any():
         return
     largest = float(np.nanmax(growth, initial=0.0)) or float(np.nanmax(np.abs(growth), initial=1e-12))
     shown = np.ma.masked_invalid(np.clip(growth, -_DEEPEST * largest, largest))

@@ -1,4 +1,4 @@
-"""Stability along a curve of flows: samples judged one by one, and the places where it changes.
+"""Stability along a curve of flows: examined flow by flow, and the places where it changes.
 
 Near the end of a stable range growth is slower than what counts as growth before it vanishes. There the neutral curve
 of the waves that begin to grow is followed to its extreme, and the end is that neutral point.
@@ -24,7 +24,7 @@ from chuteflow.stability.verdict import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
-#: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
+#: Flows of a branch that are examined by default, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
 _MOST_SAMPLES = 2000
 #: Growth, in units of what counts as growth, below which a neutral point is looked for; flows and points of its plane.
@@ -39,7 +39,8 @@ STABLE, UNKNOWN = "stable", "unknown"
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A judged flow at a ``position`` along a branch, counted in its flows; ``found`` is None where no grid tells."""
+    """An examined flow at a ``position`` along a branch, counted in its flows; ``found`` is None where it is not
+    resolved."""
 
     position: float
     flow: Flow
@@ -94,7 +95,7 @@ class MarkedBranch:
 
     def __repr__(self) -> str:
         labels = ", ".join(run.label for run in self.runs)
-        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} judged: {labels}")
+        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} examined: {labels}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +106,8 @@ class MarkedCurve:
     branches: tuple[MarkedBranch, ...]
 
     def __repr__(self) -> str:
-        judged = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
-        return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
+        examined = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        return display.line("MarkedCurve", f"{examined} examined", repr(self.curve)[1:-1])
 
 
 @on_one_thread
@@ -116,7 +117,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
 
     Args:
         curve: the branches of flows of a chute.
-        samples: flows judged on each branch, evenly along it. A stretch that is shorter than their spacing can be
+        samples: flows examined on each branch, evenly along it. A stretch that is shorter than their spacing can be
             missed.
         progress: called with the share of the samples that is done.
 
@@ -127,23 +128,23 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     found = []
     for i, branch in enumerate(curve.branches):
 
-        def told(share: float, done: int = i) -> None:
+        def show_progress(share: float, done: int = i) -> None:
             if progress is not None:
                 progress((done + share) / len(curve.branches))
 
-        found.append(_marked(branch, samples, told))
+        found.append(_marked(branch, samples, show_progress))
     return MarkedCurve(replace(curve, branches=tuple(one.branch for one in found)), tuple(found))
 
 
-def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> MarkedBranch:
+def _marked(branch: Branch, samples: int, show_progress: Callable[[float], None]) -> MarkedBranch:
     places = np.unique(np.linspace(0, len(branch.flows) - 1, min(samples, len(branch.flows))).round()).tolist()
-    judged: list[Sample] = []
+    examined: list[Sample] = []
     for place in places:
-        judged.append(_judged(branch, place))
-        told(len(judged) / len(places))
+        examined.append(_examine(branch, place))
+        show_progress(len(examined) / len(places))
     breaks: list[tuple[float, str]] = []
     changes: list[Change] = []
-    for one, two in pairwise(judged):
+    for one, two in pairwise(examined):
         if one.label == two.label:
             continue
         if UNKNOWN not in (one.label, two.label) and STABLE in (one.label, two.label):
@@ -154,11 +155,11 @@ def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> Mark
         breaks.append((place, two.label))
     points = [SpecialPoint(CHANGE, change.flow, int(change.position)) for change in changes]
     special = tuple(sorted([*branch.special, *points], key=lambda point: point.position))
-    runs = tuple(_runs(branch, judged[0].label, breaks))
-    return MarkedBranch(replace(branch, special=special), tuple(judged), runs, tuple(changes))
+    runs = tuple(_runs(branch, examined[0].label, breaks))
+    return MarkedBranch(replace(branch, special=special), tuple(examined), runs, tuple(changes))
 
 
-def _judged(branch: Branch, place: float) -> Sample:
+def _examine(branch: Branch, place: float) -> Sample:
     flow = flow_between(branch.flows, place)
     try:
         return Sample(place, flow, stability_of(flow))
@@ -171,7 +172,7 @@ def _change(branch: Branch, one: Sample, two: Sample) -> Change:
     stable, unstable = (one, two) if one.label == STABLE else (two, one)
     inner, outer = stable, unstable
     for _ in range(_HALVINGS):
-        middle = _judged(branch, 0.5 * (inner.position + outer.position))
+        middle = _examine(branch, 0.5 * (inner.position + outer.position))
         if middle.label == UNKNOWN:
             break
         if middle.label == STABLE:

@@ -119,7 +119,8 @@ class Layer:
         """
         if flow.chute.surface != "free":
             raise InputError(
-                "the interface is known for steady flows alone: time needs the free surface, give --surface free"
+                "the interface is known only for steady flows: time dependence needs the free surface, give "
+                "--surface free"
             )
         require_richman(flow.chute.base, "disturbed flows are")
         Material(flow.law, flow.chute.restitution, flow.chute.slope)

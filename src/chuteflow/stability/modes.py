@@ -1,4 +1,4 @@
-"""Normal modes of a steady flow: computed twice, told from the continuous spectrum, each with its error.
+"""Normal modes of a steady flow: computed twice, distinguished from the continuous spectrum, each with its error.
 
 An eigenvalue of the coarse grid is a mode if
 
@@ -43,7 +43,7 @@ _TAIL = 0.03
 #: Largest share that the change between grids may have in the distance to the continuous spectrum; what moves by
 #: more than the second on the finest grids is an artefact of them.
 _DRIFT, _ARTEFACT = 1e-3, 0.03
-#: Error of a rate that is asked for unless told otherwise; relative for rates above 1.
+#: Error of a rate that is asked for by default; relative for rates above 1.
 TOLERANCE = 1e-6
 #: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
 NEUTRAL, AT_REST = 1e-6, 1e-10
@@ -297,7 +297,7 @@ def leading(
     """The leading modes on the first grids that tell what grows and know it to ``tolerance``, or on the finest.
 
     Raises:
-        UnresolvedError: where the finest grids do not tell.
+        UnresolvedError: where the finest grids do not resolve it.
     """
     found: list[Mode] = []
     doubtful = True

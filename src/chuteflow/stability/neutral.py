@@ -177,7 +177,7 @@ class End(StrEnum):
     """Where a neutral curve ends, as is said of it; one that is lost names the reason beside LOST."""
 
     EDGE = "the edge of the range"
-    CLOSED = "its own beginning: it is closed"
+    CLOSED = "its own start: it is closed"
     CONTINUOUS = "where the mode runs into the continuous spectrum"
     LOST = "a point from which it could not be followed"
 

@@ -100,7 +100,8 @@ class FamilyPlane:
 
 
 def scanned(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _silent) -> EigenvalueGrid:
-    """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not tell, that is marked."""
+    """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not resolve it, that is
+    marked."""
     a, b = (np.linspace(0.0, end, n) for end, n in zip(plane.size, points, strict=True))
     sigma = np.full(points, complex(np.nan, np.nan))
     grows, unresolved = np.zeros(points, dtype=bool), np.zeros(points, dtype=bool)
@@ -124,9 +125,10 @@ def scanned(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _
 class WaveMap(Result):
     """Growth rates and frequencies (m, n) of the leading modes of ``flow`` over ``kx`` (m,) and ``ky`` (n,), in 1/d.
 
-    NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n): there the
-    grids do not tell whether something grows. ``grows`` (m, n) is where a mode grows faster than ``smallest_rate``
-    and its error. Points z (k, 2) of the ``neutral`` curves are kx and ky, and their errors are in 1/d.
+    NaN where no mode is distinguished from the continuous spectrum, which decays, and where ``unresolved`` (m, n):
+    there the grids do not resolve whether a disturbance grows. ``grows`` (m, n) is where a mode grows faster than
+    ``smallest_rate`` and its error. Points z (k, 2) of the ``neutral`` curves are kx and ky, and their errors are in
+    1/d.
     """
 
     flow: Flow
@@ -264,7 +266,7 @@ def family_map(
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
     low, high = pair("depth_wavenumber", depth_wavenumber)
     if not 0.0 < low < high <= _LARGEST_DEPTH_WAVENUMBER:
-        raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
+        raise InputError(f"k h from {low:g} to {high:g}: must increase, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
     low, high = np.log((low, high))
     plane = FamilyPlane(flows, float(np.radians(angle)), float(low), float(high - low))
     scan = scanned(plane, size, progress)
@@ -305,4 +307,4 @@ def _check_range(name: str, low: float, high: float) -> None:
     for k in (low, high):
         check_wavenumbers(*((k, 0.0) if name == "kx" else (0.0, k)))
     if not low < high:
-        raise InputError(f"{name} from {low:g} to {high:g}: the range must rise")
+        raise InputError(f"{name} from {low:g} to {high:g}: the range must increase")

@@ -48,7 +48,7 @@ class Outcome(Compared):
     time: negative where the flow approaches. At late times that is no rate of a mode: what is left then belongs to the
     continuous spectrum, which touches zero, and its slowest part on the grid of the integration depends on the grid.
     ``leading`` is the growth rate of the leading discrete mode of the nearest flow that is the same all along the
-    chute, the mass mode set apart; None where none is told.
+    chute, the mass mode set apart; None where none is resolved.
     """
 
     steady: tuple[Flow, ...]
@@ -140,7 +140,8 @@ def outcome(layer: Layer, moments: Sequence[RelaxationState]) -> Outcome:
 
 
 def leading_rate(flow: Flow) -> float | None:
-    """Growth rate of the leading discrete mode of ``flow`` at k = 0 but for the mass mode; None where none is told."""
+    """Growth rate of the leading discrete mode of ``flow`` at k = 0 but for the mass mode; None where none is
+    resolved."""
     try:
         found = leading(Disturbances(flow), 0.0, 0.0, count=2)
     except UnresolvedError:

@@ -10,7 +10,7 @@ aside too.
 
 The scan is made on a coarse grid. The maxima are computed as modes, on as many grids as it takes, and so is every
 point of the scan where something seems to grow faster than the best of them: it is faster, or an artefact of the
-coarse grid, or remains unresolved, which is told.
+coarse grid, or remains unresolved, which is reported.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _MOST_UNRESOLVED = 12
 
 @dataclass(frozen=True, eq=False)
 class FastestMode:
-    """What a search found: the ``mode`` of largest growth, and wavenumbers (kx, ky) where it could not be told.
+    """What a search found: the ``mode`` of largest growth, and wavenumbers (kx, ky) where it could not be resolved.
 
     ``examined`` is the number of wavenumbers of the scan.
     """

@@ -42,7 +42,7 @@ _MOST_POINTS = 1_000_000
 _vanishing = np.errstate(under="ignore")
 #: Samples of an element, its ends among them.
 _WITHIN_ELEMENT = np.linspace(0.0, 1.0, 7)[:-1]
-#: Share P/M of the overburden above the highest point that is told from the far field.
+#: Share P/M of the overburden above the highest point that is distinguished from the far field.
 _SMALLEST_SHARE = 1e-260
 
 
@@ -267,7 +267,7 @@ class Flow(Result):
 
     @cached_property
     def net_loss_range(self) -> tuple[float, float]:
-        """Smallest and largest dissipation less production over nu p sqrt(T) in the flow."""
+        """Smallest and largest dissipation minus production over nu p sqrt(T) in the flow."""
         net = self._samples["net"]
         return float(net.min()), float(net.max())
 
@@ -397,7 +397,7 @@ class Flow(Result):
 
     @cached_property
     def _samples(self) -> dict[str, Array]:
-        """What kinds are told from, see :func:`_samples_of`."""
+        """What kinds are distinguished from, see :func:`_samples_of`."""
         return _samples_of(self._state)
 
     @cached_property

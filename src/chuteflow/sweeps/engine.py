@@ -20,9 +20,9 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.sweeps.at_quantity import at_quantity
 from chuteflow.sweeps.bases import Flows, at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
-from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
 from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, numbers
 from chuteflow.sweeps.outcome import Flags, PointStatus, Reason, reasons
+from chuteflow.sweeps.stability import STABILITY_KINDS, STABILITY_NUMBERS, needs_stability, stability_quantities
 from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
@@ -93,8 +93,8 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
         winding += int(winds.sum())
         singly += int(solved.unsettled.sum())
         _fill_reasons(out, batch, points)
-    told = {first + i: why for i, why in sorted(failures.items())}
-    return replace(out, failures=told, singly=singly, winding=winding)
+    found_failures = {first + i: why for i, why in sorted(failures.items())}
+    return replace(out, failures=found_failures, singly=singly, winding=winding)
 
 
 def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
@@ -198,9 +198,9 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    are judged or asked for what is not carried along, or the law has breaks, at which integration in a batch would
-    lose its order."""
-    singly = wanted(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
+    have their stability computed or are asked for what is not carried along, or the law has breaks, at which
+    integration in a batch would lose its order."""
+    singly = needs_stability(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
     if not len(batch) or singly or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
@@ -291,11 +291,11 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
         out.status[point] = PointStatus.MORE_FLOWS_THAN_KEPT
     for k, flow in enumerate(found[: study.flows]):
         out.error[point, k] = flow.error
-        known, why = judged(flow) if wanted(study.quantities) else ({}, None)
+        known, why = stability_quantities(flow) if needs_stability(study.quantities) else ({}, None)
         if why is not None:
             failures[point] = why
         for name, values in out.quantities.items():
-            if name in JUDGED_KINDS or name in JUDGED_NUMBERS:
+            if name in STABILITY_KINDS or name in STABILITY_NUMBERS:
                 values[point, k] = known.get(name, values[point, k])
                 continue
             value = getattr(flow, name)

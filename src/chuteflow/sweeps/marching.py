@@ -28,7 +28,7 @@ Event = Callable[[Pointwise, Indices], Array]
 #: Members treated at once: so many that the interpreter does not count, so few that they fit the cache.
 MEMBERS = 16384
 _DENSE = 60.0
-#: Densities X below which a member may end as an empty one: the first of them at which that can be told.
+#: Densities X below which a member may end as an empty one: the first of them at which that can be decided.
 _THIN = (1e-2, 1e-3, 1e-6)
 #: By how much p is beyond what the empty state asks for, so that X and the coupling of the heat flux do not matter.
 _FIRMLY = 1.2
@@ -76,10 +76,10 @@ class Ends(AlignedArrays):
         thin = np.full(len(batch), -np.inf)
         settled, low, high = np.full((3, len(batch)), np.inf)
         for x in _THIN:
-            told = _hot_end(batch, x)
-            new = np.isneginf(thin) & np.isfinite(told[0])
+            ends = _hot_end(batch, x)
+            new = np.isneginf(thin) & np.isfinite(ends[0])
             thin[new] = np.log(x)
-            settled[new], low[new], high[new] = told[:, new]
+            settled[new], low[new], high[new] = ends[:, new]
         return cls(deepest, floor, thin, settled, low, high, 1.0 / np.maximum(rate, 1e-3), rate)
 
     def above(self, deepest: Array) -> Ends:
@@ -94,7 +94,7 @@ class Ends(AlignedArrays):
 
 def _hot_end(batch: Batch, x: float) -> Array:
     """p, and the least and largest heat flux (3, n), beyond which a member emptier than X meets no base any more;
-    infinite where that cannot be told.
+    infinite where that cannot be decided.
 
     In the empty state dv/dln p = p^2 net/a - v^2/2, so that v > 1, with which the density falls, lasts where
     p^2 > a/(2 net); and dy/dp = net - y/p - y^2/(2 a), which keeps y above or below the flux of the base for good

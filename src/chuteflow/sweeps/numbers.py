@@ -12,11 +12,11 @@ from chuteflow.steady.flow import CUTOFF
 from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.sweeps.bases import Flows
 from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Batch, Indices, Pointwise
-from chuteflow.sweeps.judged import JUDGED_KINDS
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
+from chuteflow.sweeps.stability import STABILITY_KINDS
 
 #: Names of kinds in the order of their flags.
-KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **JUDGED_KINDS}
+KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **STABILITY_KINDS}
 #: With which flows are looked at once more for what happens on the way to the base.
 _ACCURACY = Accuracy(1e-10, 1e-7)
 #: Net loss within this of zero, in its largest value on the way, decides nothing.

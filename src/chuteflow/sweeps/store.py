@@ -38,9 +38,9 @@ from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import shown_path
-from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import PointStatus, Reason, meanings
+from chuteflow.sweeps.stability import STABILITY_NUMBERS
 from chuteflow.sweeps.study import Column, Study, from_canonical
 
 _OWN, _DONE, _PARTIAL, _COLUMNS = ".chuteflow", "done", "partial", "columns"
@@ -167,8 +167,12 @@ def _kind(name: str) -> StoreVariable:
 
 
 def _number(name: str) -> StoreVariable:
-    if name in JUDGED_NUMBERS:
-        attributes: dict[str, Any] = {"long_name": JUDGED_NUMBERS[name], "units": "1", "ancillary_variables": "stable"}
+    if name in STABILITY_NUMBERS:
+        attributes: dict[str, Any] = {
+            "long_name": STABILITY_NUMBERS[name],
+            "units": "1",
+            "ancillary_variables": "stable",
+        }
         return StoreVariable("float64", float("nan"), True, attributes)
     quantity = NUMBERS[name]
     attributes = {

@@ -31,7 +31,7 @@ from chuteflow.sweeps.designs import (
     shown_key,
     shown_path,
 )
-from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
+from chuteflow.sweeps.stability import STABILITY_CHUNK, STABILITY_KINDS, STABILITY_NUMBERS, needs_stability
 from chuteflow.theory.bases import BASES, BaseCondition, base
 from chuteflow.theory.constitutive import Law, digest
 from chuteflow.theory.laws import in_folder, law
@@ -50,7 +50,7 @@ _OPTIONAL = ("base",)
 #: Restitution and slope at which values of a law are taken, by which it is known again.
 _KNOWN_BY = (0.9, 0.3)
 #: Kinds of a flow that can be kept beside the numbers of the registry.
-KINDS = ("interior", "density", *JUDGED_KINDS)
+KINDS = ("interior", "density", *STABILITY_KINDS)
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 #: Points of a chunk: at a given surface temperature, and otherwise, when more has to be done for each.
 CHUNKS = {"T_surface": 32768}
@@ -201,7 +201,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     warm = _interval(search.get("surface_temperature", SURFACE_TEMPERATURE))
     SearchRange.checked(warm, deepest)
     quantities = _quantities(results.get("quantities", list(DEFAULT_QUANTITIES)))
-    chunk = JUDGED_CHUNK if wanted(quantities) else CHUNKS.get(condition, CHUNK)
+    chunk = STABILITY_CHUNK if needs_stability(quantities) else CHUNKS.get(condition, CHUNK)
     study = Study(
         title=_title(given),
         design=design,
@@ -335,7 +335,7 @@ def _check_range(axis: DesignAxis) -> None:
 
 
 def _quantities(names: Any) -> tuple[str, ...]:
-    known = (*NUMBERS, *KINDS, *JUDGED_NUMBERS)
+    known = (*NUMBERS, *KINDS, *STABILITY_NUMBERS)
     if not isinstance(names, list) or not names:
         raise InputError(f"results.quantities = {shown(names)}: must be a list of names, from {', '.join(known)}")
     for name in names:

@@ -81,7 +81,7 @@ class HotParameters:
 
     ``F10`` slip velocity over sqrt(T) at the base (4.2), with r^2 A0/(2 g20) for r^2 A0 g20/2 as printed: the
     limit of (3.16), as in (4.3); ``F21`` heat flux from the base over nu T^(3/2) (4.3); ``delta`` dissipation
-    less production in the interior over nu^2 T^(3/2) (4.9).
+    minus production in the interior over nu^2 T^(3/2) (4.9).
     """
 
     slope: float

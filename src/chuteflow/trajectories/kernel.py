@@ -111,7 +111,7 @@ def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: floa
 
 @compiled
 def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
-    """One step of state ``j`` by the classical Runge-Kutta method in tau, of which :func:`_prepare_step` tells the
+    """One step of state ``j`` by the classical Runge-Kutta method in tau, for which :func:`_prepare_step` gives the
     lengths; integrals by Simpson."""
     p_0, p_m, p_1 = lengths[0, 0] + p_s, lengths[1, 0] + p_s, lengths[2, 0] + p_s
     rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]

@@ -86,7 +86,7 @@ class TrajectoryGrid:
 
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, one depth step after the other in the
     order of the curve; ``first`` (R + 1,) are the first of each step; ``came_from`` (N,) the place of the same
-    trajectory in the step before, between two states where it was inserted; ``goes_on`` (N,) tells whether the curve
+    trajectory in the step before, between two states where it was inserted; ``goes_on`` (N,) is whether the curve
     goes on to the next state. ``values`` (entries, 7) are the functions of L in their equations, and ``scale`` the size
     of heat fluxes. They hold for every base between those for which parts were kept: :meth:`of_base` has the zeros of
     another. ``zeros`` (Z, 3) are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2)

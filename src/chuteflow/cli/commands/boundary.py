@@ -73,7 +73,7 @@ def command(**given: Any) -> None:
             chute,
             second=BY_KEY[second].name,
             bounds=bounds,
-            progress=lambda what, share: progress.tell(f"{what}, {share:.0%} of the range"),
+            progress=lambda what, share: progress.show(f"{what}, {share:.0%} of the range"),
             **chosen,
             **search,
         )
@@ -133,7 +133,7 @@ def _report(found: BoundarySet, second: str, scales: Scales | None) -> Iterator[
         yield _points(boundary, second, scales)
     yield ""
     if found.reason:
-        yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
+        yield f"no boundary: {found.reason}" + (", within the range searched" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"

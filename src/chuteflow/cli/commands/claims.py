@@ -82,7 +82,7 @@ def _watched(verdicts: Iterable[ClaimResult], total: int) -> Iterator[ClaimResul
             progress.clear()
             yield verdict
             if number < total:
-                progress.tell(f"{number} of {total} claims")
+                progress.show(f"{number} of {total} claims")
 
 
 def _json(verdicts: Sequence[ClaimResult]) -> str:

@@ -24,7 +24,7 @@ _COLUMNS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature",
 
 
 @click.command("design", help=COMMANDS["design"], epilog=_EPILOG)
-@options.option("--unknown", metavar="NAMES", help="Parameters to be found, with commas between, such as slope,e.")
+@options.option("--unknown", metavar="NAMES", help="Parameters to be found, separated by commas, such as slope,e.")
 @options.chute_options
 @options.condition_options
 @click.option("--want", metavar="NAME=VALUE", multiple=True, help="Another number of the flow, such as depth=10.")

@@ -77,7 +77,7 @@ def command(**given: Any) -> None:
             x,
             y,
             workers=workers,
-            progress=lambda done, known: progress.tell(f"{done} of {known} columns, as far as is known"),
+            progress=lambda done, known: progress.show(f"{done} of {known} columns, as far as is known"),
             **chosen,
             **search,
         )

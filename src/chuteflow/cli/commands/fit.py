@@ -50,15 +50,19 @@ class NamedRangeType(click.ParamType):
 
 @click.command("fit", help=COMMANDS["fit"], epilog=_EPILOG)
 @click.argument("data", metavar="DATA.csv")
-@options.option("--free", metavar="NAMES", help="Parameters to be found, with commas between, such as e,ew,roughness.")
+@options.option("--free", metavar="NAMES", help="Parameters to be found, separated by commas, such as e,ew,roughness.")
 @options.chute_options
 @click.option("--base-height", is_flag=True, help="The height of the base is unknown too.")
 @click.option(
-    "--range", "ranges", type=NamedRangeType(), multiple=True, help="Where a free parameter is looked for first."
+    "--range",
+    "ranges",
+    type=NamedRangeType(),
+    multiple=True,
+    help="Range of a free parameter in which the search starts.",
 )
-@click.option("--trust", type=NamedRangeType(), multiple=True, help="Use values of z, nu, T or u in this range alone.")
+@click.option("--trust", type=NamedRangeType(), multiple=True, help="Use only values of z, nu, T or u in this range.")
 @options.option("--loss", metavar="NAME", help="linear (the default), or soft_l1, huber, cauchy for outliers.")
-@options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
+@options.option("--confidence", type=options.Number(), help="Confidence of the intervals; 0.95 by default.")
 @options.option("--trials", type=click.INT, help="Trial chutes that the search starts from; 64 for one experiment.")
 @options.output_options((), "measurements, fit and residuals")
 @options.option(
@@ -120,7 +124,7 @@ def _names(text: str | None) -> list[str]:
 
 
 def _closures(given: Mapping[str, Any]) -> list[str]:
-    """The closures that are compared: several with commas between, where none has parameters of its own."""
+    """The closures that are compared: several separated by commas, where none has parameters of its own."""
     text = given["closure"] or "lun"
     if given["settings"]:
         from chuteflow.theory.laws import settings_added
@@ -212,7 +216,7 @@ def _goodness(best: Fit) -> Iterator[str]:
     else:
         from chuteflow.fitting.measurements import ASSUMED
 
-        said = f"errors were not given: the residuals say {100.0 * ASSUMED * best.error_scale:.2g} % of every value"
+        said = f"errors were not given: the residuals imply {100.0 * ASSUMED * best.error_scale:.2g} % of every value"
         yield f"{said}; AICc = {best.aicc:.4g}"
 
 

@@ -61,7 +61,7 @@ def command(**given: Any) -> None:
             flow,
             kx=kx,
             ky=ky,
-            progress=lambda share: progress.tell(f"{share:.0%} of the map"),
+            progress=lambda share: progress.show(f"{share:.0%} of the map"),
             **size,
         )
 
@@ -76,12 +76,15 @@ def command(**given: Any) -> None:
 
 
 def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
-    """At how many points of a map no mode is told, and at how many it is not known whether something grows."""
+    """At how many points of a map no mode is resolved, and at how many it is not known whether something grows."""
     hidden = int((np.isnan(growth) & ~unresolved).sum())
     if hidden:
-        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+        yield f"no mode is distinguished from the continuous spectrum, which decays, at {hidden} points"
     if unresolved.any():
-        yield f"not known at {int(unresolved.sum())} points: the finest grids do not tell whether something grows there"
+        yield (
+            f"not known at {int(unresolved.sum())} points: the finest grids do not resolve whether a disturbance grows"
+            " there"
+        )
 
 
 def _report(found: WaveMap, scales: Scales | None) -> Iterator[str]:

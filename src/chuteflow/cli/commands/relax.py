@@ -33,8 +33,8 @@ _SAVED = (".csv", ".json")
 
 
 _EPILOG = (
-    "The flow stays the same all along the chute, and its hold-up M what it is: waves along and across the slope "
-    "are left out. The free surface alone is followed.\n\n"
+    "The flow stays uniform along the chute and keeps its hold-up M: waves along and across the slope are left "
+    "out. Only the free surface is supported.\n\n"
     "Example: chuteflow relax --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --heat 1.2"
 )
 
@@ -73,7 +73,7 @@ def command(**given: Any) -> None:
             temperature=given["heat"],
             velocity=given["push"],
             duration=duration,
-            progress=lambda time: progress.tell(f"t = {time:.6g} of {duration:.6g}"),
+            progress=lambda time: progress.show(f"t = {time:.6g} of {duration:.6g}"),
         )
     moments, end = followed.moments, followed.outcome
     content = _content(flow, moments, end, scales)

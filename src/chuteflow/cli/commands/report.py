@@ -24,7 +24,7 @@ _NAME = "index.html"
 
 
 @click.command("report", help=COMMANDS["report"], epilog=_EPILOG)
-@options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
+@options.option("--out", metavar="DIR", help="Directory to write to, created if needed; here by default.")
 @options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
 @options.option("--only", type=FigureNumbers(), help="Numbers of the figures, such as 2,3; all by default.")
 @click.option("--no-claims", is_flag=True, help="Leave out the claims.")

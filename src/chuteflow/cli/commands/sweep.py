@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from chuteflow.sweeps.study import Study
 
 _EPILOG = (
-    "A study is a TOML file with the tables [design], [parameters], [search] and [results]. What is interrupted or "
-    "killed goes on where it was with the same command.\n\n"
+    "A study is a TOML file with the tables [design], [parameters], [search] and [results]. The same command "
+    "continues a study that was interrupted or killed.\n\n"
     "Example: chuteflow sweep study.toml --out study.zarr"
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
@@ -64,14 +64,16 @@ class Chunks(click.ParamType):
 
 @click.command("sweep", help=COMMANDS["sweep"], epilog=_EPILOG)
 @click.argument("study", metavar="STUDY")
-@options.option("--out", metavar="STORE", help="Zarr store to make or go on with, such as study.zarr.")
+@options.option("--out", metavar="STORE", help="Zarr store to create or continue, such as study.zarr.")
 @options.option("--workers", type=click.INT, help="Processes on this machine; one for each core by default.")
 @options.option("--cluster", metavar="ADDRESS", help="Use the dask.distributed scheduler at ADDRESS instead.")
-@options.option("--chunks", type=Chunks(), help="Compute these chunks alone: N, A:B or A:B:STEP, with commas between.")
-@click.option("--dry-run", is_flag=True, help="Tell points, chunks and an estimate of the time, and write nothing.")
-@click.option("--status", is_flag=True, help="Check the store, and tell what of it is done and which points failed.")
+@options.option("--chunks", type=Chunks(), help="Compute only these chunks: N, A:B or A:B:STEP, separated by commas.")
+@click.option(
+    "--dry-run", is_flag=True, help="Print the points, the chunks and an estimate of the time; write nothing."
+)
+@click.option("--status", is_flag=True, help="Check the store; print how much is done and which points failed.")
 @options.quiet_option
-@click.option("--no-check", is_flag=True, help="Believe the markers of the store: do not check its arrays.")
+@click.option("--no-check", is_flag=True, help="Trust the markers of the store; do not check its arrays.")
 def command(study: str, **given: Any) -> None:
     """Read the study, compute what is left of it and tell what came out."""
     from chuteflow.sweeps.study import read
@@ -86,7 +88,7 @@ def command(study: str, **given: Any) -> None:
 
     if given["status"]:
         if not os.path.exists(given["out"]):
-            raise InputError(f"there is no store {given['out']} as yet: leave --status away to make it")
+            raise InputError(f"there is no store {given['out']} yet: omit --status to create it")
         click.echo("\n".join(_status(Store.made(given["out"], read_study), check=not given["no_check"])))
         return
     chosen = _chosen(read_study, given["chunks"])
@@ -262,7 +264,7 @@ class SweepProgress:
             f"{self._flows} flows, {self._failed} points failed, {_time(left)} left"
         )
         if self._line.is_shown:
-            self._line.tell(text)
+            self._line.show(text)
         elif not options.is_quiet():
             click.echo(text, err=True)
 

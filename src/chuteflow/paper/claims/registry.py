@@ -1,8 +1,8 @@
 """What a claim is, how its verdict is decided, and the table of all claims.
 
 A claim is one function without arguments that computes and returns a :class:`Finding`, under the decorator
-:func:`claim`. The verdict follows from what was computed: ``holds`` tells whether the statement holds as printed;
-where it does not, ``corrected`` tells whether what is said in its place does, by an argument of its own.
+:func:`claim`. The verdict follows from what was computed: ``holds`` is whether the statement holds as printed;
+where it does not, ``corrected`` is whether what is said in its place does, by an argument of its own.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ _PART_2 = "section 3.5, and Part 2"
 
 
 @cache
-def _judged() -> dict[str, tuple[Flow, Stability]]:
+def _stability_of_flows() -> dict[str, tuple[Flow, Stability]]:
     """Flows of the paper's chute by name, from hot to cold, with their stability."""
     chute = dissipative(SLOPE)
     chosen = {f"T_inf = {T:g}": flows(chute, T_surface=T)[0] for T in _WARMTH}
@@ -51,8 +51,8 @@ def _kind(found: Stability) -> str:
 )
 def three_unstable_modes() -> Finding:
     """Directions of the modes that grow fastest."""
-    judged = _judged()
-    leaders = {"flow A": judged["flow A"][1], "flow C": judged["flow C"][1], "a steep flow": _steep()}
+    found_by_name = _stability_of_flows()
+    leaders = {"flow A": found_by_name["flow A"][1], "flow C": found_by_name["flow C"][1], "a steep flow": _steep()}
     kinds = {name: _kind(found) for name, found in leaders.items()}
     numbers = "; ".join(
         f"{name}: {_kind(found)}, k h = {_depth_wavenumber(found):.2g}, growth {found.mode.growth:.2g}"
@@ -80,7 +80,7 @@ def _depth_wavenumber(found: Stability) -> float:
 )
 def stable_in_a_small_part() -> Finding:
     """Which flows of the paper's chute are stable."""
-    kinds = {name: _kind(found) for name, (_, found) in _judged().items()}
+    kinds = {name: _kind(found) for name, (_, found) in _stability_of_flows().items()}
     stable = [name for name, kind in kinds.items() if kind == "stable"]
     return decide(
         "a small part",
@@ -99,7 +99,7 @@ def stable_in_a_small_part() -> Finding:
 def inversion_and_stability() -> Finding:
     """Whether each of the two goes with either of the other."""
     seen = {}
-    for name, (flow, found) in _judged().items():
+    for name, (flow, found) in _stability_of_flows().items():
         if found.stable is not None:
             seen.setdefault(f"{flow.density}, {'stable' if found.stable else 'unstable'}", name)
     return decide(
@@ -115,13 +115,13 @@ def inversion_and_stability() -> Finding:
 @cache
 def _budgets() -> dict[str, ModeBudget]:
     """Energy budgets of the fastest modes: of one of each kind, and of two where something else may feed it."""
-    judged = _judged()
+    found_by_name = _stability_of_flows()
     chute, temperature = _STEEP_ALONG
     vortices, flux = _VORTICES
     (inverted,) = (flow for flow in flows(vortices, Q=flux) if flow.density == "inverted")
     fastest = {
-        "flow A": judged["flow A"][1],
-        "flow C": judged["flow C"][1],
+        "flow A": found_by_name["flow A"][1],
+        "flow C": found_by_name["flow C"][1],
         "a steep flow": _steep(),
         "a steep flow, along": stability_of(flows(chute, T_surface=temperature)[0]),
         "an inverted flow, short waves": stability_of(inverted),

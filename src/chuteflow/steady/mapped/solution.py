@@ -607,8 +607,8 @@ def refine(
 ) -> MappedSolution:
     """The flow on ``chute`` nearest to ``start`` that meets ``condition``, to a relative ``tolerance`` in Q, h and M.
 
-    The first degree is where the coefficients of ``start`` have decayed to the tolerance. Each solution is judged
-    by a step of Newton's method at a larger degree, and the degree raised as the error asks for. Other
+    The first degree is where the coefficients of ``start`` have decayed to the tolerance. The error of each solution is
+    estimated by a step of Newton's method at a larger degree, and the degree raised as the error asks for. Other
     arguments as for :func:`solve_mapped`. Where ``largest_degree`` does not suffice the status says so.
 
     Raises:
@@ -677,8 +677,8 @@ def _sampled(system: MappedSystem, flow: Flow) -> Array:
 def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolution:
     """The flow near ``z`` that meets ``condition``, and its error.
 
-    The error is judged by the change in ln Q, ln h and ln M in one step of Newton's method at a larger degree, and by
-    the decay of the coefficients: where these are barely resolved, the larger degree may be little better.
+    The error is estimated by the change in ln Q, ln h and ln M in one step of Newton's method at a larger degree, and
+    by the decay of the coefficients: where these are barely resolved, the larger degree may be little better.
     """
 
     def step(system: MappedSystem, z: Array) -> tuple[Array, Array, Array, Array]:
