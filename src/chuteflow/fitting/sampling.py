@@ -7,13 +7,13 @@ estimated, then at that size.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
 from chuteflow import display
 from chuteflow.checks import whole
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 from chuteflow.fitting.calibration import Fit
 from chuteflow.fitting.objective import Objective
 from chuteflow.fitting.residuals import TrialChute, TrialFlow
@@ -64,10 +64,7 @@ def sample(found: Fit, *, steps: int = _STEPS, seed: int = 0) -> Posterior:
     Raises:
         InputError: without emcee, or for a fit of another kind.
     """
-    try:
-        emcee = import_module("emcee")
-    except ImportError:
-        raise InputError("sampling needs emcee: install chuteflow[bayes]") from None
+    emcee = require("emcee", "bayes", "sampling")
     if found.loss != "linear" or any(one.base is not None for one in found.experiments):
         raise InputError("sampling knows fits with a linear loss and known heights of the bases")
     steps = whole("steps", steps, 8, 1_000_000)

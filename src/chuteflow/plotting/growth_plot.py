@@ -78,7 +78,7 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
     style.spread_scale(right, "x", [[flux_scale * flow.mass_flux for flow in flows] for flows in found.neutral_flows])
     style.logarithmic(right, "y")
     if found.neutral:
-        style.legend(right)
+        style.legend(figure, handles=right.get_lines(), loc="outside lower center", ncols=4)
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
         found.angle, f"waves at {found.angle:g} degrees to the slope"
     )

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _NAMES = (r"$\nu'$", "$u'$", "$v'$", "$w'$", "$T'$")
 #: Phases of a section, arrows along and up, and shades of the density.
 _PHASES, _ARROWS, _SHADES = 97, (17, 13), 13
+#: Where the axis of the moduli ends, which are at most 1: the legend is beyond.
+_ROOM = 1.62
 #: Sizes below this share of the largest velocity are none.
 _NOTHING = 1e-9
 
@@ -108,7 +110,10 @@ def _profiles(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | 
             ax.plot(values[shown] / size, length * height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
     ax.set_ylim(0.0, length * top)
     style.name_axes(ax, "modulus over its largest, as listed", style.label("height", scales))
-    style.legend(ax, loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
+    # Beside the curves, which it would hide.
+    ax.set_xlim(-0.03, _ROOM)
+    ax.set_xticks(np.linspace(0.0, 1.0, 5))
+    style.legend(ax, loc="center right", handlelength=1.8, handletextpad=0.5)
 
 
 def _section(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:

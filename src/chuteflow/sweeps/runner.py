@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 from chuteflow.processes import WorkerPool, death, worker_pool
 from chuteflow.sweeps.store import Marker, Store, StoreError
 from chuteflow.sweeps.work import work
@@ -67,13 +68,9 @@ def cluster_workers(address: str) -> Workers:
     import logging
     from concurrent.futures import CancelledError
 
-    try:
-        from distributed import Client, KilledWorker
-        from distributed.client import FutureCancelledError
-    except ImportError:
-        raise InputError(
-            "--cluster needs dask.distributed: install it with the extra 'cluster', chuteflow[cluster]"
-        ) from None
+    require("distributed", "cluster", "--cluster")
+    from distributed import Client, KilledWorker
+    from distributed.client import FutureCancelledError
 
     # What is lost on the way is told here, in a line.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

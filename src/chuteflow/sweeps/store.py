@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.extras import require
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import shown_path
@@ -378,6 +379,7 @@ class Store:
 
     def _encoded(self, chunk: int, arrays: Mapping[str, NDArray[Any]]) -> dict[str, bytes]:
         """The files of a chunk, as Zarr writes them."""
+        _require_zarr()
         from zarr.storage import MemoryStore
 
         first, last = self.study.extent(chunk)
@@ -393,6 +395,7 @@ class Store:
 
     @staticmethod
     def _opened(place: Any) -> Any:
+        _require_zarr()
         import zarr
 
         return zarr.open_group(place, mode="r" if isinstance(place, Path) else "r+", use_consolidated=False)
@@ -579,9 +582,14 @@ def _lay_out(path: Path, study: Study) -> None:
         _put(path / name, content)
 
 
+def _require_zarr() -> None:
+    require("zarr", "sweep", "a sweep")
+
+
 @lru_cache(maxsize=4)
 def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
     """The metadata of a store by their place in it, as Zarr writes them."""
+    _require_zarr()
     import zarr
     from zarr.codecs import BytesCodec, Crc32cCodec, ZstdCodec
     from zarr.storage import MemoryStore

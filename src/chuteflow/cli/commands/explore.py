@@ -8,6 +8,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.extras import require
 
 #: Addresses that stand for all of this machine's, under names that cannot be known.
 _ANY = ("0.0.0.0", "::")
@@ -19,6 +20,8 @@ _ANY = ("0.0.0.0", "::")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 def command(port: int | None, host: str | None, no_browser: bool) -> None:
     """Serve until interrupted."""
+    for name in ("starlette", "uvicorn"):
+        require(name, "explore", "the explorer")
     import uvicorn
 
     from chuteflow.explorer.connections import Connection, Server
