@@ -122,6 +122,6 @@ def why_unknown(found: Stability) -> str | None:
     if not found.complete:
         return "one wave or one direction was examined: without --kx and --ky all are searched"
     return (
-        f"no disturbance is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids "
-        "do not resolve whether one does"
+        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids "
+        "do not resolve whether something does"
     )
