@@ -267,7 +267,7 @@ def small_domain():
         ({"axes": [["slope", 0.4, 0.3], ["roughness", 0.5, 0.6]]}, "must increase"),
         ({"columns": [[0.0, []], [1.0, []]]}, "a column must have"),
         ({"columns": [[0.0, [[[0.5], [0]]]]]}, "one class more than stops"),
-        ({"columns": [[2.0, []]]}, "a share of an axis = 2"),
+        ({"columns": [[2.0, []]]}, "a fraction of an axis = 2"),
         ({"columns": [[0.5, []], [0.5, []]]}, "must increase"),
         ({"temperatures": ["hot"]}, "temperatures = 'hot'"),
         ({"format": 0}, "format = 0"),

@@ -22,7 +22,7 @@ from chuteflow.stability.verdict import leading, wavenumbers
 
 #: Degrees of the grid of the map, tried in turn; relative difference of rates from those of the search that will do.
 DEGREES, ALIKE = (20, 26, 32), 0.02
-#: Points beyond the best that are checked: the map's grid may be wrong by this share.
+#: Points beyond the best that are checked: the map's grid may be wrong by this fraction.
 MARGIN = 0.05
 MOST_CHECKED = 400
 

@@ -113,7 +113,7 @@ def test_scales_are_consistent():
     a = hot(paper(0.3)).parameters
     assert a.lambda_ == pytest.approx(2.0 * MATERIAL.g30 / (3.0 * a.delta * a.alpha**2), rel=1e-13)
     assert 2.0 * MATERIAL.g30 / 3.0 == pytest.approx(a.F21 * a.alpha, rel=1e-13)
-    # The share of shear in the flux does not depend on alpha.
+    # The fraction of shear in the flux does not depend on alpha.
     assert a.mu * a.lambda_ == pytest.approx(0.3 * a.F21 / (MATERIAL.g20 * a.F10 * a.delta), rel=1e-13)
 
 

@@ -159,7 +159,7 @@ def derivative(case: Case, log_p: Any, z: Array) -> Array:
 def start(case: Case, p: Any, surface_temperature: Any) -> Array:
     """State (7, ...) at normal stress ``p`` below a surface, by (3.23)-(3.25) or (3.31)-(3.32).
 
-    On the half-line the leading terms err by the share (p/T)^2 in T and p/T in q, which is itself of order p^2.
+    On the half-line the leading terms err by the fraction (p/T)^2 in T and p/T in q, which is itself of order p^2.
     """
     t, p = np.broadcast_arrays(np.asarray(surface_temperature, dtype=float), np.asarray(p, dtype=float))
     z = np.zeros((7, *t.shape))
@@ -233,7 +233,7 @@ def macroscopic(case: Case, z: Array, p: Any, p0: Any, surface_temperature: Any)
     mass = p - case.p_s
     f1, f2 = (g := Table1(case, *densities(z[LOGIT]))).bases()
     root_t = np.exp(0.5 * z[B])
-    # above the start depth = T ln(p/p0) and W = 0, to the share p0/T
+    # above the start depth = T ln(p/p0) and W = 0, to the fraction p0/T
     moment = z[DEPTH] * mass - z[DEPTH_MOMENT] + top * surface_temperature
     flux = (f1 * root_t + z[LOST]) * mass - z[LOST_MOMENT]
     excess = z[HEAT] / (p * root_t) - f2 / g.g1
@@ -618,7 +618,7 @@ class Scan:
 
 
 def _rows(first: float, p_s: float, mass: float, rate: float) -> Array:
-    """Values of p: at first the overburden grows by 8 % a step, then by a fixed share of the shortest length."""
+    """Values of p: at first the overburden grows by 8 % a step, then by a fixed fraction of the shortest length."""
     step = min(0.15 / (rate + 1e-12), 0.05)
     thin = first if p_s == 0.0 else 1e-6 * min(1.0, step)
     turn = min(max(step / 0.08, thin), mass)

@@ -1,6 +1,6 @@
 """The flows that are given, beside those of a brute force that shares nothing with the program (``brute_force``).
 
-CHUTEFLOW_BRUTE_FORCE sets the share of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners,
+CHUTEFLOW_BRUTE_FORCE sets the fraction of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners,
 some 20 minutes.
 """
 
@@ -213,7 +213,7 @@ def questions(rng: np.random.Generator, chute: Chute, deep_only: bool) -> Iterat
 
 
 def run(group: str, share: float, seed: int = 14) -> Tally:
-    """A share of one group of chutes."""
+    """A fraction of one group of chutes."""
     sample, number, deep_only = GROUPS[group]
     tally, seen = Tally(), 0
     for i in range(max(1, round(share * number))):
@@ -256,7 +256,7 @@ CORNERS = [
 
 
 def run_corners(share: float) -> Tally:
-    """A share of the questions at corners and edges: answered, and fast."""
+    """A fraction of the questions at corners and edges: answered, and fast."""
     tally = Tally()
     for chute, name, value in CORNERS[:: max(1, round(1.0 / share))]:
         tally.questions += 1

@@ -195,7 +195,7 @@ def boundary(
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
     control: ContinuationSettings = CONTROL,
-    progress: Callable[[str, float], object] = lambda what, share: None,
+    progress: Callable[[str, float], object] = lambda what, fraction: None,
 ) -> BoundarySet:
     """Follow every boundary of a kind over a range of a second parameter, through its turning points.
 
@@ -210,7 +210,7 @@ def boundary(
         surface_temperature: range of T_surface.
         largest_holdup: largest M.
         control: steps of the continuation.
-        progress: called with what is being done and the share of the range that is done.
+        progress: called with what is being done and the fraction of the range that is done.
 
     Raises:
         InputError: for an unknown kind or parameter, or a range or number out of bounds.
@@ -225,11 +225,11 @@ def boundary(
     entered: list[tuple[TracedBranch, ...]] = []
     skipped: list[float] = []
 
-    def follow(points: Iterator[BoundaryPoint], share: float) -> None:
+    def follow(points: Iterator[BoundaryPoint], fraction: float) -> None:
         for point in points:
             inside = within.contains(point.flow.solution.macroscopic)
             if inside and not any(other.holds(point) for other in found):
-                notice = partial(progress, "following", share)
+                notice = partial(progress, "following", fraction)
                 line = traced(point, within, tolerance, control, notice)
                 # A point that could not be distinguished from those of a known line has led to it once more.
                 if not any(line.repeats(other) for other in found):
@@ -238,8 +238,8 @@ def boundary(
     values = np.linspace(sweep.low, sweep.high, samples).tolist()
     spacing = (sweep.high - sweep.low) / (samples - 1)
     for i, value in enumerate(values):
-        share = i / samples
-        progress("searching", share)
+        fraction = i / samples
+        progress("searching", fraction)
         branches, value = _branches_at(sweep, value, spacing, within)
         if branches is None:
             skipped.append(value)
@@ -247,7 +247,7 @@ def boundary(
         sampled.append(value)
         entered.append(tuple(branches))
         for condition in seeds.conditions(of):
-            follow(seeds.on_branches(sweep, condition, value, branches, spacing, tolerance), share)
+            follow(seeds.on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
     for condition in seeds.conditions(of):
         for low, high in pairwise(values):
             for value in seeds.whatever_the_flow(sweep, condition, low, high):

@@ -121,7 +121,7 @@ class Fold:
         return Fold(self.which, u[:, -1], v[-1])
 
     def pivot(self, at: Linearisation) -> float:
-        """Share of the gradient of the quantity in the left null vector: 0 where the branch itself is singular."""
+        """Fraction of the gradient of the quantity in the left null vector: 0 where the branch itself is singular."""
         _, _, w = self._solved(at)
         return abs(float(w[-1])) / float(np.linalg.norm(w))
 

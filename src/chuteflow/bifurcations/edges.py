@@ -34,13 +34,13 @@ def left(
     passed = np.flatnonzero(ended > 0.0)
     if not len(passed):
         return None
-    shares = np.minimum(begun[passed], 0.0) / (np.minimum(begun[passed], 0.0) - ended[passed])
-    share, edge = float(shares.min()), int(passed[np.argmin(shares)])
+    fractions = np.minimum(begun[passed], 0.0) / (np.minimum(begun[passed], 0.0) - ended[passed])
+    fraction, edge = float(fractions.min()), int(passed[np.argmin(fractions)])
     words = _words(point.system, within)[edge]
     if begun[edge] > -_REACHED:
         return None, words
     unknown, sign = _LEADING[edge]
-    start = before.z + share * (point.z - before.z)
+    start = before.z + fraction * (point.z - before.z)
     target = float(start[unknown - 3])
     there = solved(point.system, start, np.eye(3)[unknown], target, tolerance)
     for _ in range(_ADJUSTED):

@@ -41,8 +41,8 @@ _BEYOND, _BESIDE = 0.02, 1.0
 _HALVINGS = 6
 #: A boundary beside the branches is looked for as far as so many times the distance to go to it.
 _FARTHER = 1.5
-#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
-#: tolerance, and ends where so small a share is left.
+#: A walk there goes by at most this fraction of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a fraction is left.
 _STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
@@ -183,11 +183,11 @@ def _near(
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
-    share = 1.0 - sigma if one is last.solution else sigma
+    fraction = 1.0 - sigma if one is last.solution else sigma
     problem = one.problem
     _, matrix = other.problem.transferred(problem.degree, problem.stretch)
     moved = np.concatenate([matrix @ other.z[:-2], other.z[-2:]])
-    w = np.append(one.z + share * (moved - one.z), value)
+    w = np.append(one.z + fraction * (moved - one.z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
         point = solved(system, w, HELD, value, tolerance)

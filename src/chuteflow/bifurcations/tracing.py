@@ -27,7 +27,7 @@ CONTROL = ContinuationSettings(
 )
 #: A boundary is closed where it passes its start within this part of the step, in about its direction.
 _CLOSE, _ALONG = 0.05, 0.9
-#: Below this share of the quantity in the null vector, the branch itself is singular.
+#: Below this fraction of the quantity in the null vector, the branch itself is singular.
 _SINGULAR = 1e-5
 #: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
@@ -90,8 +90,8 @@ class TracedBoundary:
         out = []
         for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0)).tolist():
             one, other = stops[i][1], stops[i + 1][1]
-            share = off[i] / (off[i] - off[i + 1])
-            w = one.w + share * (_carried(other.w, other.system, one.system) - one.w)
+            fraction = off[i] / (off[i] - off[i + 1])
+            w = one.w + fraction * (_carried(other.w, other.system, one.system) - one.w)
             out.append(solved(one.system, w, HELD, value, tolerance))
         return out
 
@@ -273,11 +273,11 @@ def _returned(
     root = np.sqrt(last.system.weights[-3:])
     a, b, c = (root * p.z[-3:] for p in (first, before, last))
     step = c - b
-    share = float((a - b) @ step) / float(step @ step)
-    beside = float(np.linalg.norm(b + share * step - a)) / float(np.linalg.norm(step))
+    fraction = float((a - b) @ step) / float(step @ step)
+    beside = float(np.linalg.norm(b + fraction * step - a)) / float(np.linalg.norm(step))
     headings = [root * p.tangent[-3:] for p in (first, last)]
     cosine = float(headings[0] @ headings[1]) / float(np.prod([np.linalg.norm(h) for h in headings]))
-    return 0.0 <= share < 1.0 and beside < _CLOSE and cosine > _ALONG
+    return 0.0 <= fraction < 1.0 and beside < _CLOSE and cosine > _ALONG
 
 
 def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:

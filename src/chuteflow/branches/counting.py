@@ -53,8 +53,8 @@ def flows_at_flux(branches: Iterable[SteadyBranch], mass_flux: float) -> int:
 
 
 def most_at_once(stretches: Array, apart: float = 0.0) -> int:
-    """The largest number of ``stretches`` (k, 2), each from a lower to a higher value, that share a value, where those
-    that overlap by no more than ``apart`` do not count as sharing one."""
+    """The largest number of ``stretches`` (k, 2), each from a lower to a higher value, that share a value, where
+    those that overlap by no more than ``apart`` do not count as sharing one."""
     low, high = stretches.T
     edges = np.concatenate([low + apart, high])
     order = np.lexsort((np.repeat([1, 0], len(low)), edges))

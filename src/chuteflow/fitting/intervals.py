@@ -140,15 +140,15 @@ class _IntervalSide:
             return here + (inside - here) * min(grown, 5.0)
         if not np.isfinite(outside_root):
             return 0.5 * (inside + outside)
-        share = (goal - inside_root) / (outside_root - inside_root)
-        return inside + float(np.clip(share, 0.05, 0.95)) * (outside - inside)
+        fraction = (goal - inside_root) / (outside_root - inside_root)
+        return inside + float(np.clip(fraction, 0.05, 0.95)) * (outside - inside)
 
     def _fitted(self, value: float, nearest: Minimum) -> Minimum | None:
         """The best fit with the unknown at ``value``: from the nearest known one, the others moved as they go along."""
-        for start, share in ((nearest, 1.0), (nearest, 0.0), (self.best, 1.0)):
+        for start, fraction in ((nearest, 1.0), (nearest, 0.0), (self.best, 1.0)):
             x = start.x.copy()
             spread = self.covariance[self.which, self.which]
-            if share and spread > 0.0:
+            if fraction and spread > 0.0:
                 moved = self.covariance[:, self.which] / spread * (value - x[self.which])
                 x = x + np.where(np.isfinite(moved), moved, 0.0)
             x[self.which] = value

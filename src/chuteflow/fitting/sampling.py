@@ -20,7 +20,7 @@ from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.threads import on_one_thread
 
-#: Steps of each walker, and the share of them that is thrown away.
+#: Steps of each walker, and the fraction of them that is thrown away.
 _STEPS, _SHARE_OF_START = 400, 0.25
 #: Walkers for each unknown.
 _WALKERS = 4
@@ -40,7 +40,7 @@ class Posterior:
         return display.line("Posterior", display.counted(len(self.draws), "draw"), ", ".join(self.keys))
 
     def interval(self, key: str, confidence: float = 0.95) -> tuple[float, float]:
-        """The central interval of a parameter that holds a share ``confidence`` of the draws.
+        """The central interval of a parameter that holds a fraction ``confidence`` of the draws.
 
         Raises:
             InputError: for a parameter that was not free.

@@ -338,7 +338,7 @@ def _about_domain(found: Domain) -> dict[str, Any]:
         **fixed,
         **_searched(found.searched),
         "tolerance": found.tolerance,
-        "tolerance_comment": "share of each axis to which boundaries are located",
+        "tolerance_comment": "fraction of each axis to which boundaries are located",
     }
 
 

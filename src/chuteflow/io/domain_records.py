@@ -83,7 +83,7 @@ def in_si(found: Domain, scales: Scales | None) -> dict[str, Any]:
 
 
 def shares(found: Domain) -> dict[str, Any]:
-    """The share of the cells that has each value, number by number; of ``exists_at`` at each temperature."""
+    """The fraction of the cells that has each value, number by number; of ``exists_at`` at each temperature."""
     return {
         **{name: _shares(getattr(found, name)) for name in CLASSES},
         "exists_at": [_shares(layer) for layer in found.exists_at],
@@ -176,7 +176,7 @@ def _columns_from(kept: Sequence[Any], count: int) -> tuple[Column, ...]:
     """Columns of ``count`` parts each.
 
     Raises:
-        InputError: for places or stops that are no shares of an axis, or do not rise.
+        InputError: for places or stops that are no fractions of an axis, or do not rise.
     """
     places = _shares_from([place for place, _ in kept])
     columns = tuple(
@@ -196,9 +196,9 @@ def _part_from(stops: Any, values: Any) -> PiecewiseConstant:
 
 
 def _shares_from(kept: Any) -> tuple[float, ...]:
-    found = tuple(number("a share of an axis", share, 0.0, 1.0) for share in kept)
+    found = tuple(number("a fraction of an axis", fraction, 0.0, 1.0) for fraction in kept)
     if any(one >= two for one, two in pairwise(found)):
-        raise InputError("shares of an axis must increase")
+        raise InputError("fractions of an axis must increase")
     return found
 
 

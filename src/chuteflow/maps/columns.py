@@ -14,21 +14,21 @@ from dataclasses import dataclass
 
 from chuteflow.maps.plane import Code
 
-#: The class at shares of the outer and of the inner axis.
+#: The class at fractions of the outer and of the inner axis.
 Classify = Callable[[float, float], Code]
 
 
 @dataclass(frozen=True)
 class PiecewiseConstant:
-    """One number of the class along a column: ``values`` has one entry more than ``stops``, the shares of the
+    """One number of the class along a column: ``values`` has one entry more than ``stops``, the fractions of the
     inner axis, ascending, between them."""
 
     stops: tuple[float, ...]
     values: tuple[int, ...]
 
-    def at(self, share: float) -> int:
-        """The number at a share of the inner axis."""
-        return self.values[bisect_right(self.stops, share)]
+    def at(self, fraction: float) -> int:
+        """The number at a fraction of the inner axis."""
+        return self.values[bisect_right(self.stops, fraction)]
 
     def without_bands(self, width: float) -> PiecewiseConstant:
         """The part with no band narrower than ``width`` between two stops: these meet half-way."""
@@ -66,23 +66,23 @@ def alike(
 
 @dataclass(frozen=True)
 class Column:
-    """Classes along the inner axis at the share ``place`` of the outer one, number by number."""
+    """Classes along the inner axis at the fraction ``place`` of the outer one, number by number."""
 
     place: float
     parts: tuple[PiecewiseConstant, ...]
 
 
-def column(place: float, classify: Classify, shares: Iterable[float], tolerance: float) -> Column:
+def column(place: float, classify: Classify, fractions: Iterable[float], tolerance: float) -> Column:
     """The column at ``place``: classified at ``shares`` and at both ends, and halved where the class changes."""
-    stops, codes = halved(place, classify, shares, tolerance)
+    stops, codes = halved(place, classify, fractions, tolerance)
     return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
 
 
 def halved(
-    place: float, classify: Classify, shares: Iterable[float], tolerance: float
+    place: float, classify: Classify, fractions: Iterable[float], tolerance: float
 ) -> tuple[list[float], list[Code]]:
     """The stops of a column at ``place``, ascending, and the classes between them, one more."""
-    points = sorted({0.0, 1.0, *(s for s in shares if 0.0 < s < 1.0)})
+    points = sorted({0.0, 1.0, *(s for s in fractions if 0.0 < s < 1.0)})
     known = [(s, classify(place, s)) for s in points]
     stops: list[float] = []
     codes = [known[0][1]]
@@ -113,7 +113,7 @@ def part(stops: Sequence[float], values: Sequence[int]) -> PiecewiseConstant:
 def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: float) -> list[float]:
     """Where to classify a new column: evenly at ``guards`` shares, and around the stops that those ``nearby`` (up
     to two to either side, ascending) lead to expect."""
-    shares = [(i + 0.5) / guards for i in range(guards)]
+    fractions = [(i + 0.5) / guards for i in range(guards)]
     places = [one.place for one in nearby]
     each = zip(*(one.parts for one in nearby), strict=True)
     last = -1.0
@@ -121,9 +121,9 @@ def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: f
         # Numbers that change together are expected to do so at nearly the same stop.
         if stop - last > 0.5 * tolerance:
             # A little more than the tolerance apart would be halved once more.
-            shares += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
+            fractions += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
             last = stop
-    return shares
+    return fractions
 
 
 def _expected(place: float, places: Sequence[float], parts: Sequence[PiecewiseConstant]) -> list[float]:
@@ -142,12 +142,14 @@ def _expected(place: float, places: Sequence[float], parts: Sequence[PiecewiseCo
 
 def between(left: Column, right: Column, number: int, place: float, tolerance: float) -> PiecewiseConstant:
     """The part ``number`` at a place between two columns: on lines, or else as in the nearer one."""
-    share = (place - left.place) / (right.place - left.place)
+    fraction = (place - left.place) / (right.place - left.place)
     pair = alike(left.parts[number], right.parts[number], tolerance)
     if pair is None:
-        return (left if share < 0.5 else right).parts[number]
+        return (left if fraction < 0.5 else right).parts[number]
     one, two = pair
-    return PiecewiseConstant(tuple(a + share * (b - a) for a, b in zip(one.stops, two.stops, strict=True)), one.values)
+    return PiecewiseConstant(
+        tuple(a + fraction * (b - a) for a, b in zip(one.stops, two.stops, strict=True)), one.values
+    )
 
 
 def to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> list[tuple[int, float]]:

@@ -31,7 +31,7 @@ from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
-#: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
+#: Fractions of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
 TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
@@ -48,7 +48,7 @@ class Domain(Result):
     """Classes over ``plane``, on a grid of cells and by their outlines.
 
     ``x`` (m,) and ``y`` (n,) are the centres of the cells. All else on the grid is (n, m), row by row from the
-    lowest y. ``tolerance`` is the share of either axis to which boundaries are known. ``columns`` are those from
+    lowest y. ``tolerance`` is the fraction of either axis to which boundaries are known. ``columns`` are those from
     which grid and outlines are read, and ``hot_columns`` those of the closed form of section 4, none with the
     interface conditions, which that leaves out.
     """
@@ -72,7 +72,7 @@ class Domain(Result):
             for values in (getattr(self, name),)
             for value in np.unique(values)
         ]
-        return display.html_table(repr(self)[1:-1], ["class", "value", "share of the cells"], rows)
+        return display.html_table(repr(self)[1:-1], ["class", "value", "fraction of the cells"], rows)
 
     @classmethod
     def on_cells(
@@ -187,7 +187,7 @@ def domain(
             value, such as ``("slope", 0.1, 0.5)``.
         size: cells along x and y.
         temperatures: surface temperatures at which flows are looked for too.
-        tolerance: share of an axis to which boundaries are located, from 1e-6 to 0.1.
+        tolerance: fraction of an axis to which boundaries are located, from 1e-6 to 0.1.
         surface_temperature: range searched.
         largest_holdup: range searched.
         workers: processes. With 1 all is done in this one; with more, a script needs the usual
@@ -201,7 +201,9 @@ def domain(
     size = checked_size(size, 1, LARGEST_SIZE)
     tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
-        raise InputError(f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a share of an axis")
+        raise InputError(
+            f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a fraction of an axis"
+        )
     within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     temperatures = tuple(number("temperature", t) for t in temperatures)
     for t in temperatures:
@@ -285,7 +287,7 @@ def _gridded(
     outer: NDArray[np.float64],
     inner: NDArray[np.float64],
 ) -> NDArray[np.int16]:
-    """One number of the class at shares of the outer and inner axis, (outer, inner)."""
+    """One number of the class at fractions of the outer and inner axis, (outer, inner)."""
     places = np.array([one.place for one in columns])
     grid = np.empty((len(outer), len(inner)), dtype=np.int16)
     for i, place in enumerate(outer.tolist()):

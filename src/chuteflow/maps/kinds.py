@@ -20,7 +20,7 @@ INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
 #: Turns of ln Q along a branch are distinguished if they differ by more.
 _TURN = 1e-6
-#: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
+#: A net loss below this fraction of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
 _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
@@ -143,16 +143,16 @@ def _scatter(log_q: Array, at: Array) -> Array:
 
 
 def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
-    """The steps in which ``rise`` changes sign, and the shares of them at which it does so; a step in which it passes
-    zero twice, as just beyond a cusp, is there twice."""
+    """The steps in which ``rise`` changes sign, and the fractions of them at which it does so; a step in which it
+    passes zero twice, as just beyond a cusp, is there twice."""
     changes = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
     pairs = [(dip.step, zero) for dip in dips(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros]
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
-    shares = np.concatenate(
+    fractions = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]
     )
-    order = np.lexsort((shares, steps))
-    return steps[order], shares[order]
+    order = np.lexsort((fractions, steps))
+    return steps[order], fractions[order]
 
 
 def _confirmed(stops: list[float], rises: float, noise: list[float]) -> list[float]:

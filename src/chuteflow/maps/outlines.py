@@ -19,7 +19,7 @@ from chuteflow.maps.columns import Column, PiecewiseConstant, alike, part
 from chuteflow.maps.plane import CODES, HOT_CODES, ParameterPlane
 from chuteflow.result import Compared
 
-#: A point: shares of the outer and of the inner axis.
+#: A point: fractions of the outer and of the inner axis.
 Point = tuple[float, float]
 #: The values to either side of a line, the lesser first.
 Label = tuple[int, int]
@@ -129,7 +129,7 @@ def _summed(parts: Sequence[PiecewiseConstant], factors: Sequence[int]) -> Piece
     """The part whose values are sums of those of ``parts``, each times its factor."""
     stops = sorted({stop for one in parts for stop in one.stops})
     inside = [0.5 * (a + b) for a, b in pairwise([-1.0, *stops, 2.0])]
-    values = [sum(f * one.at(share) for f, one in zip(factors, parts, strict=True)) for share in inside]
+    values = [sum(f * one.at(fraction) for f, one in zip(factors, parts, strict=True)) for fraction in inside]
     return part(stops, values)
 
 

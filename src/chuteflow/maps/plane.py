@@ -69,9 +69,9 @@ class ParameterAxis:
         if not self.low < self.high:
             raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must increase")
 
-    def at(self, share: Any) -> Any:
-        """The value (or values) at a share of the range, 0 to 1."""
-        return self.low + (self.high - self.low) * share
+    def at(self, fraction: Any) -> Any:
+        """The value (or values) at a fraction of the range, 0 to 1."""
+        return self.low + (self.high - self.low) * fraction
 
 
 @dataclass(frozen=True)
@@ -121,13 +121,13 @@ class ParameterPlane:
         return self.x if self.transposed else self.y
 
     def chute_at(self, outer: float, inner: float) -> Chute:
-        """The chute at shares 0 to 1 of the outer and inner axis."""
+        """The chute at fractions 0 to 1 of the outer and inner axis."""
         u, v = float(self.outer.at(outer)), float(self.inner.at(inner))
         return self.at(v, u) if self.transposed else self.at(u, v)
 
 
 def code(plane: ParameterPlane, outer: float, inner: float) -> Code:
-    """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
+    """The class of the point at fractions of the outer and inner axis of ``plane``, by CODES."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     return (
         found.most,
@@ -139,7 +139,7 @@ def code(plane: ParameterPlane, outer: float, inner: float) -> Code:
 
 
 def summary(plane: ParameterPlane, outer: float, inner: float) -> Code:
-    """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
+    """The class of the point at fractions of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
     return (hot, found.most, found.families, found.interior, found.density)
@@ -156,7 +156,7 @@ def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
 
 
 def hot_code(plane: ParameterPlane, outer: float, inner: float) -> Code:
-    """What is known in closed form of the point at shares of the outer and inner axis, by HOT_CODES.
+    """What is known in closed form of the point at fractions of the outer and inner axis, by HOT_CODES.
 
     All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
@@ -189,8 +189,8 @@ def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[Traject
     served = [chute]
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:
-            shares = np.linspace(0.0, 1.0, _BETWEEN)
-            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
+            fractions = np.linspace(0.0, 1.0, _BETWEEN)
+            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in fractions]
     within = plane.within
     temperature = starting_temperatures(within.coldest, within.hottest)
     if plane.temperatures:

@@ -30,7 +30,7 @@ _APART = 2.5
 _EVEN = 12.0
 #: Weights of a cubic whose sizes sum to more extrapolate.
 _SOUND = 3.0
-#: Zeros are near to each other within this share of the distances around.
+#: Zeros are near to each other within this fraction of the distances around.
 _NEAR = 0.3
 #: Surface temperatures of neighbours tell them apart if their logarithms differ by more.
 _DISTINCT = 1e-7
@@ -240,8 +240,8 @@ def _slope_weights(at: Array) -> Array:
 
 
 def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) -> tuple[Array, Array]:
-    """The share of the way at zeros between states ``left`` and the next, and there ln Q, ln T_surface, L and y (4, k):
-    of the cubic through four neighbours where they are in one piece and even enough, else on the line."""
+    """The fraction of the way at zeros between states ``left`` and the next, and there ln Q, ln T_surface, L and y (4,
+    k): of the cubic through four neighbours where they are in one piece and even enough, else on the line."""
     around = left[:, None] + np.arange(-1, 3)
     low, high = grid.first[rows], grid.first[rows + 1] - 1
     inside = (around[:, 0] >= low) & (around[:, 3] <= high)

@@ -39,10 +39,10 @@ CAUTION = 4.0
 WIDE = 1e-3
 #: How far a trial of the ITP method is pushed across the zero of the secant, in units of the first bracket.
 PUSH = 0.02
-#: How far beyond the end of a segment a change of sign is looked for, as a share of the chord.
+#: How far beyond the end of a segment a change of sign is looked for, as a fraction of the chord.
 FARTHEST = 0.1
 #: A curve is closed by a segment that passes its start within this part of its length, at up to this angle,
-#: and may miss its ends by this share.
+#: and may miss its ends by this fraction.
 CLOSE, PARALLEL, SLACK = 0.02, 0.1, 1e-6
 EPSILON = float(np.finfo(float).eps)
 
@@ -501,7 +501,7 @@ class Located(Generic[S]):
 
 
 class _Trial(NamedTuple, Generic[S]):
-    """A point of the curve, its share of the chord that it projects to, and the monitor's value there."""
+    """A point of the curve, its fraction of the chord that it projects to, and the monitor's value there."""
 
     share: float
     value: float
@@ -509,7 +509,7 @@ class _Trial(NamedTuple, Generic[S]):
 
 
 class _Bracket(NamedTuple, Generic[S]):
-    """Two trials around a change of sign, the monitor's slope over the share of the chord, and a status."""
+    """Two trials around a change of sign, the monitor's slope over the fraction of the chord, and a status."""
 
     left: _Trial[S]
     right: _Trial[S]
@@ -554,7 +554,7 @@ def locate(
 
 
 def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float) -> _Bracket[S]:
-    """The bracket of a change of sign, shrunk to twice a ``fine`` share of the chord, or to the noise."""
+    """The bracket of a change of sign, shrunk to twice a ``fine`` fraction of the chord, or to the noise."""
     start = right.share - left.share
     slope = (right.value - left.value) / start
     for remaining in range(1 + max(0, math.ceil(math.log2(0.5 * start / fine))), 0, -1):
@@ -618,14 +618,14 @@ class _Segment(Generic[S]):
             raise InputError("The points are not two successive points of a trace: their tangents lead elsewhere.")
 
     def finest(self, tolerance: float) -> float:
-        """Half the share of the chord that is as long as ``tolerance``, or that round-off allows."""
+        """Half the fraction of the chord that is as long as ``tolerance``, or that round-off allows."""
         metric, a, b = self._metric, self._a, self._b
         length = metric.arc(a.z, b.z, metric.angle(a.tangent, b.tangent))
         round_off = EPSILON * (1.0 + metric.size(a.z) / metric.size(self._chord))
         return max(0.5 * tolerance / length, 4.0 * round_off)
 
     def speed(self, point: CurvePoint[S]) -> float:
-        """Arclength per share of the chord."""
+        """Arclength per fraction of the chord."""
         return float(self._row @ self._chord / (self._row @ point.tangent))
 
     def end(self, share: float, point: CurvePoint[S]) -> _Trial[S]:
@@ -645,7 +645,7 @@ class _Segment(Generic[S]):
 
 
 def _across(row: Array, a: CurvePoint[S], b: CurvePoint[S], x: float) -> Array:
-    """The cubic through two points, where the product with ``row`` has made the share ``x`` of its way."""
+    """The cubic through two points, where the product with ``row`` has made the fraction ``x`` of its way."""
     length = row @ (b.z - a.z)
     return _cubic(a.z, length / (row @ a.tangent) * a.tangent, b.z, length / (row @ b.tangent) * b.tangent, x)
 

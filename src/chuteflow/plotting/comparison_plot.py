@@ -22,8 +22,8 @@ _RATIOS = {
     "g2": r"$-P_{xz}/(g_2\sqrt{T}\,u')$",
     "g5": r"$\gamma/(g_5 T^{3/2})$",
 }
-#: Measured layers are shown with this share of the mass above them, or more, and with this part of the largest volume
-#: fraction, or more, near the base: others hold hardly a grain.
+#: Measured layers are shown with this fraction of the mass above them, or more, and with this part of the largest
+#: volume fraction, or more, near the base: others hold hardly a grain.
 _HIGHEST, _EMPTY = 0.02, 0.02
 #: Errors shown by a band, and points of a line of the theory.
 _BAND, _POINTS = 2.0, 161

@@ -53,7 +53,7 @@ _TEMPERATURES = tuple(
         (style.VERMILION, style.SOLID),
     )
 )
-#: A region gets a label where a circle of this share of the axes fits into it.
+#: A region gets a label where a circle of this fraction of the axes fits into it.
 _ROOM = 0.035
 #: Side of the raster on which that is looked for.
 _RASTER = 160

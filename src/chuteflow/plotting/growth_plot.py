@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SHADES, _DEEPEST = 8, 2.0
 #: First digits of round numbers, the roundest first; others are for axes with fewer ticks than these.
 _DIGITS, _ROUNDEST, _FEW = (1, 2, 5, 3, 7, 4, 6, 8, 9), (1, 2, 5), 3
-#: Smallest distance of ticks, as a share of the axis.
+#: Smallest distance of ticks, as a fraction of the axis.
 _APART = 0.08
 _MAP_OF_COLOURS = "RdBu_r"
 _NEUTRAL = style.LineStyle(style.BLACK, style.SOLID)
@@ -104,8 +104,8 @@ def _round_places(place: Any, temperature: Any) -> dict[float, str]:
             value = digit * 10.0**power
             above = np.log(temperature / value)
             for i in np.flatnonzero((above[:-1] < 0.0) != (above[1:] < 0.0)):
-                share = above[i] / (above[i] - above[i + 1])
-                at = float(place[i] + share * (place[i + 1] - place[i]))
+                fraction = above[i] / (above[i] - above[i + 1])
+                at = float(place[i] + fraction * (place[i + 1] - place[i]))
                 if all(abs(at - other) >= _APART for other in found):
                     found[at] = f"{value:g}"
     return found

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
-#: The picture begins at this share of the whole time, on a logarithmic axis.
+#: The picture begins at this fraction of the whole time, on a logarithmic axis.
 _FIRST = 1e-5
 
 

@@ -27,7 +27,7 @@ _NAMES = (r"$\nu'$", "$u'$", "$v'$", "$w'$", "$T'$")
 _PHASES, _ARROWS, _SHADES = 97, (17, 13), 13
 #: Where the axis of the moduli ends, which are at most 1: the legend is beyond.
 _ROOM = 1.62
-#: Sizes below this share of the largest velocity are none.
+#: Sizes below this fraction of the largest velocity are none.
 _NOTHING = 1e-9
 
 

@@ -185,7 +185,7 @@ def title() -> dict[str, Any]:
 
 
 def inset(ax: Axes, place: tuple[float, float, float, float]) -> Axes:
-    """Small axes inside ``ax``: left, bottom, width and height as shares of it."""
+    """Small axes inside ``ax``: left, bottom, width and height as fractions of it."""
     small = ax.inset_axes(place)
     _calm(small)
     small.tick_params(labelsize=_SIZE - 2.0)

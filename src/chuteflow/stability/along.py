@@ -119,7 +119,7 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
         curve: the branches of flows of a chute.
         samples: flows examined on each branch, evenly along it. A stretch that is shorter than their spacing can be
             missed.
-        progress: called with the share of the samples that is done.
+        progress: called with the fraction of the samples that is done.
 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
@@ -128,9 +128,9 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     found = []
     for i, branch in enumerate(curve.branches):
 
-        def show_progress(share: float, done: int = i) -> None:
+        def show_progress(fraction: float, done: int = i) -> None:
             if progress is not None:
-                progress((done + share) / len(curve.branches))
+                progress((done + fraction) / len(curve.branches))
 
         found.append(_marked(branch, samples, show_progress))
     return MarkedCurve(replace(curve, branches=tuple(one.branch for one in found)), tuple(found))
@@ -215,9 +215,9 @@ def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
         extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended is End.EDGE and curve.z[i, 1] > 0.0))
     if not extremes or not min(extremes)[2]:
         return None
-    share, error, _ = min(extremes)
+    fraction, error, _ = min(extremes)
     per_share = abs(flows[-1].surface_temperature - flows[0].surface_temperature)
-    place = stable + share * (outer.position - stable)
+    place = stable + fraction * (outer.position - stable)
     return Change(flow_between(branch.flows, place), place, error * per_share, neutral=True)
 
 

@@ -1,6 +1,6 @@
 """A steady flow as the state that is disturbed: its fields and d/dz on a grid that reaches far above the grains.
 
-# notation: m = P/M share of the overburden, s grid coordinate (0 far above, 1 at the base), L reach.
+# notation: m = P/M fraction of the overburden, s grid coordinate (0 far above, 1 at the base), L reach.
 
 The grid runs in ln m, which is -z/T_inf far above, from m = exp(-L) to m = 1. A weight beta adds points near
 the base, where ln m is a poor measure of height: s is linear in ln m + beta m. The derivative is exact with

@@ -40,7 +40,7 @@ def growth(
         kx: range of wavenumbers along the slope, in 1/d; by default to three times that of the fastest growing mode.
         ky: range of wavenumbers across the slope.
         size: points along kx and ky.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
@@ -64,7 +64,7 @@ def neutral(
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
         size: points along k h and along the branch.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, a chute without flows, and where stability cannot be posed.

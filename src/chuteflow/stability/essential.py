@@ -32,9 +32,9 @@ def relaxation(flow_base: BaseState) -> tuple[Array, Array]:
     return relaxation_at(flow_base.flow, shares(grid(fine.degree).nodes, fine)[0])
 
 
-def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
+def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:
     """u and -Re sigma_c where ``share`` of the mass lies above."""
-    profile = flow.at_overburden(share)
+    profile = flow.at_overburden(fraction)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, flow.law
     g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
@@ -56,5 +56,5 @@ def distance(values: Complex, curve: Complex) -> Array:
     start, step = curve[:-1], np.diff(curve)
     length = np.maximum(np.abs(step) ** 2, 1e-300)
     off = values[:, None] - start
-    share = np.clip((off * step.conj()).real / length, 0.0, 1.0)
-    return np.abs(off - share * step).min(axis=1)
+    fraction = np.clip((off * step.conj()).real / length, 0.0, 1.0)
+    return np.abs(off - fraction * step).min(axis=1)

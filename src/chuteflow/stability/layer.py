@@ -42,7 +42,7 @@ from chuteflow.theory.transport import Material, Vector, traction
 #: Degree of the grid in m.
 DEGREE = 40
 FIELDS = 4
-#: Share of the mass above the highest node, where fields are those of the far field to rounding.
+#: Fraction of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
 #: Densities far above the base fall off to zero.
 _vanishing = np.errstate(under="ignore")

@@ -45,7 +45,7 @@ FIELDS = 5
 
 #: Wavenumbers at which the quadratic operator is evaluated, and their monomials 1, kx, ky, kx^2, kx ky, ky^2.
 _SAMPLES = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1]], dtype=float)
-#: Step, in shares of k, of the derivatives of the gas above the grid: smooth, and small beside the rest.
+#: Step, in fractions of k, of the derivatives of the gas above the grid: smooth, and small beside the rest.
 _DIFFERENCE = 1e-5
 
 

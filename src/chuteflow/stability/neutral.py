@@ -32,7 +32,7 @@ from chuteflow.stability.modes import Disturbances
 _STEP = 1e-4
 #: The grids on which curves are followed, and on which the errors of their points are estimated.
 _LEVEL, _FINEST = 1, 2
-#: A mode changes with the coordinates as at the point before, by this share of the larger square of both slopes.
+#: A mode changes with the coordinates as at the point before, by this fraction of the larger square of both slopes.
 _ALIKE = 0.3
 #: Error of a point, in the coordinates of the plane, beyond which it is none.
 _ASTRAY = 0.02
@@ -127,8 +127,8 @@ def _entered(
     plane: NeutralPlane, scan: EigenvalueGrid, line: Array, found: Sequence[NeutralCurve], control: ContinuationSettings
 ) -> NeutralCurve | None:
     """The neutral curve near a rough one; None if it is among those found, or cannot be entered."""
-    for share in (0.5, 0.25, 0.75, 0.1, 0.9):
-        i = int(share * (len(line) - 1))
+    for fraction in (0.5, 0.25, 0.75, 0.1, 0.9):
+        i = int(fraction * (len(line) - 1))
         along = line[min(i + 1, len(line) - 1)] - line[max(i - 1, 0)]
         if not along.any():
             continue
@@ -230,9 +230,9 @@ def _at_edge(
     system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: ContinuationSettings
 ) -> Iterator[_Neutral]:
     """The point of the curve where coordinate ``which`` is ``edge``, if there is one to be had."""
-    share = (edge - inside[which]) / (outside[which] - inside[which])
+    fraction = (edge - inside[which]) / (outside[which] - inside[which])
     direction = np.eye(2)[which]
-    for point in trace(system, inside + share * (outside - inside), direction=direction, control=control):
+    for point in trace(system, inside + fraction * (outside - inside), direction=direction, control=control):
         z = np.where(direction > 0.0, edge, point.z)
         neutral = system.followed_to(z)
         if neutral.error <= _ASTRAY:

@@ -25,7 +25,7 @@ from chuteflow.stability.verdict import stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
-#: Called with the share of a scan that is done.
+#: Called with the fraction of a scan that is done.
 Progress = Callable[[float], None]
 #: Flows of a branch whose operators are kept, for the next point is near.
 _KEPT = 8
@@ -207,7 +207,7 @@ def wave_map(
         kx: range along the slope in 1/d; by default from 0 to three times the wavenumber of the fastest growing mode.
         ky: the same across the slope.
         size: points along kx and ky; about 20 ms each.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for wavenumbers or sizes out of range, and where stability cannot be posed.
@@ -253,7 +253,7 @@ def family_map(
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
         size: points along k h, evenly in the logarithm, and along the branch; about 20 ms each.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.

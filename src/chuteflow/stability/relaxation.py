@@ -22,8 +22,8 @@ from chuteflow.threads import on_one_thread
 
 #: Relative error of a step in time.
 TOLERANCE = 1e-7
-#: A flow comes to rest whose temperature at the base has fallen to this share, and whose density there has risen to
-#: this share of the densest.
+#: A flow comes to rest whose temperature at the base has fallen to this fraction, and whose density there has risen to
+#: this fraction of the densest.
 _COLD, _PACKED = 1e-4, 0.995
 
 

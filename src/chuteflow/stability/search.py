@@ -50,7 +50,7 @@ _ROUGH, _EXACT = 1e-4, 1e-7
 _EVALUATIONS = 30
 #: Angles aside of a wave along or across at which it is seen whether it is a maximum; below the last it is one.
 _ASIDE, _ALIGNED = np.radians((1.5, 4.0)), np.radians(0.2)
-#: Maxima are one if they are this near in ln k and a, and an ascent that gains more than this share is gone on with.
+#: Maxima are one if they are this near in ln k and a, and an ascent that gains more than this fraction is gone on with.
 _SAME, _GAIN, _ANEW = 0.05, 1e-4, 3
 #: Unresolved points after which further ones are not tried: each costs the finest grids.
 _MOST_UNRESOLVED = 12
@@ -283,9 +283,9 @@ class _GrowthMaximisation:
         here = min(self.known, key=lambda place: place.distance(log_k, angle))
         step = _STEP
         while (left := here.distance(log_k, angle)) > 0.0:
-            share = min(1.0, step / left)
-            ahead = here.log_k + share * (log_k - here.log_k), here.angle + share * (angle - here.angle)
-            there = self._followed(*((log_k, angle) if share == 1.0 else ahead), here)
+            fraction = min(1.0, step / left)
+            ahead = here.log_k + fraction * (log_k - here.log_k), here.angle + fraction * (angle - here.angle)
+            there = self._followed(*((log_k, angle) if fraction == 1.0 else ahead), here)
             if self._alike(here, there):
                 self.known.append(there)
                 here, step = there, min(2.0 * step, _STEP)

@@ -1,6 +1,6 @@
 """The discretised steady problem: Chebyshev collocation in the overburden coordinate, exact Jacobian.
 
-# notation: s grid coordinate, m = P/M share of the overburden, theta heat potential, g = dtheta/dm,
+# notation: s grid coordinate, m = P/M fraction of the overburden, theta heat potential, g = dtheta/dm,
 # otherwise as in chuteflow.steady.model.
 
 The unknown field is g at the nodes of a grid on 0 <= s <= 1; with it go theta at the surface and ln M.
@@ -36,7 +36,7 @@ def stretch_map(s: Array, stretch: Array | float) -> tuple[Array, Array]:
 
 
 def stretch_position(m: Array, stretch: Array | float) -> Array:
-    """s at shares m: the inverse of :func:`stretch_map`."""
+    """s at fractions m: the inverse of :func:`stretch_map`."""
     alpha = np.maximum(stretch, _PLAIN)
     return np.log1p(m * np.expm1(alpha)) / alpha
 

@@ -30,7 +30,7 @@ from chuteflow.theory.constitutive import Law
 if TYPE_CHECKING:
     from chuteflow.steady.sensitivity import Sensitivity
 
-#: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
+#: Fraction of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
 #: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
 _SAMPLES = 96
@@ -210,7 +210,7 @@ class Flow(Result):
 
     @cached_property
     def _share_above_depth(self) -> float:
-        """Share of the mass hold-up above the depth: 0 where that is the height of the interface."""
+        """Fraction of the mass hold-up above the depth: 0 where that is the height of the interface."""
         target = np.log(CUTOFF * self.largest_volume_fraction)
         if self._model.surface_stress and self._log_density(0.0) >= target:
             return 0.0
@@ -330,11 +330,11 @@ class Flow(Result):
         """All fields where ``share`` (array, above 0 and at most 1) of the mass hold-up lies above, exactly there.
 
         Raises:
-            InputError: for a share out of range.
+            InputError: for a fraction out of range.
         """
         share = real_array("share", share)
         if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
-            raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
+            raise InputError("fractions of the overburden must be above 0 (surface) and at most 1 (base)")
         return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
@@ -372,7 +372,7 @@ class Flow(Result):
 
     @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
-        """Potential, gradient, closures and density at shares m = P/M of the overburden."""
+        """Potential, gradient, closures and density at fractions m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
         s = stretch_position(share, problem.stretch)
         theta, g = problem.grid.interpolate(np.stack([state.theta, state.g]), s)
@@ -402,7 +402,7 @@ class Flow(Result):
 
     @cached_property
     def _share_of_largest(self) -> Array:
-        """Share of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
+        """Fraction of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
         # Where grains are packed almost densest, samples alone do not tell.
         return max(self._largest_sampled(), np.ones(1), key=lambda share: self._log_density(float(share[0])))
 
@@ -459,7 +459,7 @@ class Flow(Result):
 
     @_vanishing
     def _shares_at(self, z: Array) -> Array:
-        """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
+        """Fractions of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
         samples = self._samples["share"].copy()
         if p_s == 0.0:
@@ -535,7 +535,7 @@ def rough_kinds(solutions: Sequence[Solution]) -> Array:
 
 @_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
-    """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
+    """Fraction of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem
     fine = replace(problem, degree=max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])

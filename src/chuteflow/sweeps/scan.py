@@ -107,7 +107,7 @@ def scan(
         tolerance: relative error allowed in Q, h and M.
         surface_temperature: range searched.
         largest_holdup: range searched.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
         parameters: ``slope``, ``restitution`` or ``e``, ``wall_restitution`` or ``ew``, ``roughness``, and one of
             ``Q``, ``M``, ``h`` and ``T_surface``: numbers, or one-dimensional arrays, which become axes in their order.
 

@@ -126,7 +126,7 @@ class Richman(BaseCondition):
 
 @dataclass(frozen=True)
 class JohnsonJackson(BaseCondition):
-    """A wall that takes a share of the tangential momentum: Johnson & Jackson 1987. The roughness does not enter.
+    """A wall that takes a fraction of the tangential momentum: Johnson & Jackson 1987. The roughness does not enter.
 
     F1 = s g1 6 nu*/(pi sqrt(3) phi nu g0), and the loss over g1 is (pi sqrt(3)/(4 nu*)) (1 - e_w^2) nu g0.
 

@@ -102,7 +102,7 @@ class HotParameters:
 
     @property
     def mu(self) -> float:
-        """Share of shear in the velocity (4.16); infinite where F21 = 0."""
+        """Fraction of shear in the velocity (4.16); infinite where F21 = 0."""
         return self.alpha * self.slope / (self.F10 * self.dilute.g20)
 
     @property

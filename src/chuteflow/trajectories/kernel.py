@@ -52,7 +52,7 @@ _COLDEST, _DENSEST = -8.0, 55.0
 _BETWEEN = 5
 #: Trajectories inserted into one interval in one depth step at most.
 _MOST_INSERTED = 12
-#: The series at the surface of the half-line is used up to this share of T.
+#: The series at the surface of the half-line is used up to this fraction of T.
 START = 0.05
 #: Reasons why the curve ends.
 DONE, FULL = range(2)

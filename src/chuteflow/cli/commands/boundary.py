@@ -73,7 +73,7 @@ def command(**given: Any) -> None:
             chute,
             second=BY_KEY[second].name,
             bounds=bounds,
-            progress=lambda what, share: progress.show(f"{what}, {share:.0%} of the range"),
+            progress=lambda what, fraction: progress.show(f"{what}, {fraction:.0%} of the range"),
             **chosen,
             **search,
         )

@@ -25,7 +25,7 @@ _EPILOG = (
 )
 #: Endings of the files that --out writes.
 _WRITTEN = (".json", ".txt")
-#: Shares of the width of the columns claim, printed and computed; the verdict takes what it needs.
+#: Fractions of the width of the columns claim, printed and computed; the verdict takes what it needs.
 _SHARES = (0.5, 0.2, 0.3)
 _VERDICT_WIDTH, _GAP, _NARROWEST, _WIDEST = 13, 2, 72, 140
 
@@ -130,7 +130,7 @@ def _report(verdicts: Iterable[ClaimResult], width: int) -> Iterator[str]:
     from chuteflow.paper.claims import VERDICTS, shown
 
     free = width - _VERDICT_WIDTH - 3 * _GAP
-    widths = [_VERDICT_WIDTH, *(int(share * free) for share in _SHARES)]
+    widths = [_VERDICT_WIDTH, *(int(fraction * free) for fraction in _SHARES)]
     yield from _row(["verdict", "claim", "printed", "computed"], widths)
     yield from _row(["-" * width for width in widths], widths)
     numbers: dict[str, int] = dict.fromkeys(VERDICTS, 0)

@@ -79,7 +79,7 @@ def _mark_stability(found: Curve, samples: int | None) -> MarkedCurve:
 
     chosen = {} if samples is None else {"samples": samples}
     with Progress() as progress:
-        return marked(found, progress=lambda share: progress.show(f"{share:.0%} of the flows examined"), **chosen)
+        return marked(found, progress=lambda fraction: progress.show(f"{fraction:.0%} of the flows examined"), **chosen)
 
 
 def _report(found: Curve, stability: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:

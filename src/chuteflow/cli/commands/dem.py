@@ -28,7 +28,7 @@ _EPILOG = (
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
 _SELDOM, _OFTEN = 20.0, 0.5
-#: Share of the grains above the highest layer that is told.
+#: Fraction of the grains above the highest layer that is told.
 _ABOVE = 0.005
 _TOLD = ("mass_flux", "mass_holdup", "centre_of_mass", "mean_temperature", "slip_velocity", "heat_from_base")
 
@@ -294,10 +294,10 @@ def _warnings(run: Run, measured: Measured) -> Iterator[str]:
     bounds, scene = run.scene.bounds, run.scene
     if not run.is_complete:
         yield f"the run has come to step {run.done} of {run.steps.last}"
-    share = measured.numbers["contact_share"]
-    if scene.stiffness is None and share > bounds.contact_share:
+    fraction = measured.numbers["contact_share"]
+    if scene.stiffness is None and fraction > bounds.contact_share:
         yield (
-            f"a grain has {share:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
+            f"a grain has {fraction:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
             "contact times: grains rest on one another, or contacts are too soft"
         )
     above = measured.numbers["share_above"]

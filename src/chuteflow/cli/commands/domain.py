@@ -51,7 +51,7 @@ class NumbersInUnits(click.ParamType):
     "--temperature", type=NumbersInUnits(), help="Surface temperatures at which to look for flows, as 1,10,100."
 )
 @options.option(
-    "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
+    "--tolerance", type=options.Number(), help="Fraction of an axis to locate boundaries to; 0.002 by default."
 )
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
@@ -139,11 +139,11 @@ def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
     ]
     yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, {plane.chute.laws}"
     yield ""
-    rows = [["", "value", "share of the plane"]]
+    rows = [["", "value", "fraction of the plane"]]
     parts = shares(found)
     for name, (_, values) in CLASSES.items():
-        for value, share in parts[name].items():
-            rows.append([name, _named(int(value), values, name in BITS), f"{share:.2%}"])
+        for value, fraction in parts[name].items():
+            rows.append([name, _named(int(value), values, name in BITS), f"{fraction:.2%}"])
     of = None if "slope" in (x.name, y.name) else scales
     for temperature, part in zip(plane.temperatures, parts["exists_at"], strict=True):
         at = words.amount("surface_temperature", temperature, plane.chute, of) if of else f"{temperature:g}"

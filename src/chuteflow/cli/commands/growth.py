@@ -61,7 +61,7 @@ def command(**given: Any) -> None:
             flow,
             kx=kx,
             ky=ky,
-            progress=lambda share: progress.show(f"{share:.0%} of the map"),
+            progress=lambda fraction: progress.show(f"{fraction:.0%} of the map"),
             **size,
         )
 

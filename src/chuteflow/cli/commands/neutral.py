@@ -64,7 +64,7 @@ def command(**given: Any) -> None:
         mapped = family_map(
             traced.branches[0].flows,
             angle=angle,
-            progress=lambda share: progress.show(f"{share:.0%} of the map"),
+            progress=lambda fraction: progress.show(f"{fraction:.0%} of the map"),
             **asked,
         )
 

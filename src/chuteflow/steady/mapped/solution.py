@@ -76,7 +76,7 @@ _CHECK = 1.25
 _SAFETY = 3.0
 #: With a larger residual between the nodes, a solution of the discrete equations is none of the equations.
 _SPURIOUS = 0.3
-#: Where X is below this share of its largest value, it falls with height: there a rise would be an error.
+#: Where X is below this fraction of its largest value, it falls with height: there a rise would be an error.
 _THIN = 0.05
 #: X may dip below zero in the far field by so much of its largest value.
 _DIP = 1e-3
