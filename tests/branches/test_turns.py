@@ -97,8 +97,8 @@ def test_special_points_are_the_same_for_ten_points_and_for_four_thousand():
                 # The position is that of the flow just before it.
                 for point, branch in ((one, few), (other, many)):
                     mass = np.log(branch.mass_holdup / point.flow.mass_holdup)
-                    warmth = np.log(branch.surface_temperature / point.flow.surface_temperature)
-                    assert np.argmin(np.hypot(mass, warmth)) - point.position in (0, 1)
+                    log_temperature = np.log(branch.surface_temperature / point.flow.surface_temperature)
+                    assert np.argmin(np.hypot(mass, log_temperature)) - point.position in (0, 1)
 
 
 def test_four_flows_of_one_flux_between_two_folds_past_a_cusp():

@@ -27,7 +27,7 @@ VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0
 KINDS = {"interior": INTERIORS, "density": DENSITIES}
 MACROSCOPIC = ("mass_flux", "centre_of_mass", "mass_holdup")
 PAPER = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
-#: Laws that are marched side by side, in the order of their numbers.
+#: Laws that are integrated in batches, in the order of their numbers.
 CLOSURES = ("lun", "lun-fourier")
 
 #: Quantities for which chutes are solved in batches.

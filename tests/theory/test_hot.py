@@ -84,11 +84,11 @@ def test_boundary_functions_are_the_limits_of_3_16_and_3_18(name):
     for nu in (1e-4, 1e-5):
         x = np.array([nu / (1.0 - nu / LAWS[name].densest)])
         f = reduce(LAWS[name], x, e, slope)
-        shear, grip = f.shear[0], f.grip[0]
+        shear, wall_shear = f.shear[0], f.wall_shear[0]
         g1 = nu * f.compressibility[0]
         k = boundary.kappa(r)
-        F1 = slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * r**2 * grip)
-        within = k * F1**2 - slope * (k * shear - 0.5 * r**2 * grip) * F1
+        F1 = slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * r**2 * wall_shear)
+        within = k * F1**2 - slope * (k * shear - 0.5 * r**2 * wall_shear) * F1
         F2 = g1 * math.sqrt(2.0 / math.pi) * (within - 2.0 * (1.0 - e_w) / (1.0 + math.sqrt(1.0 - r**2)))
         errors.append((F1 - limit.F10, F2 / nu - limit.F21))
     assert np.abs(errors[1]).max() < 1e-3

@@ -91,12 +91,12 @@ class Table1:
         lid = math.sqrt(1.0 - c.r**2)
         kappa = 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)  # (2.11)
         a = 1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * self.nu * self.g0))  # (2.12)
-        grip = kappa - 0.5 * a * c.r**2
-        f1 = c.slope / kappa * (math.sqrt(math.pi / 2.0) + grip * self.g1 / self.g2)
+        wall_shear = kappa - 0.5 * a * c.r**2
+        f1 = c.slope / kappa * (math.sqrt(math.pi / 2.0) + wall_shear * self.g1 / self.g2)
         f2 = (
             self.g1
             * math.sqrt(2.0 / math.pi)
-            * (kappa * f1**2 - self.g1 * c.slope / self.g2 * grip * f1 - 2.0 * (1.0 - c.e_w) / (1.0 + lid))
+            * (kappa * f1**2 - self.g1 * c.slope / self.g2 * wall_shear * f1 - 2.0 * (1.0 - c.e_w) / (1.0 + lid))
         )
         return f1, f2
 
@@ -434,7 +434,7 @@ def _joints(shooting: Shooting, x: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(eq=False)
 class Patch:
-    """Trajectories side by side by fixed steps: rows are values of p, columns surface temperatures.
+    """A batch of trajectories by fixed steps: rows are values of p, columns surface temperatures.
 
     ``b``, ``y``, ``logit`` (K, C) as in the notation; ``excess`` the base condition; ``logs`` (4, K, C) ln Q, ln h,
     ln M, ln T_surface were the base there. A patch other than the first lies between column ``column`` and the next
@@ -455,7 +455,7 @@ class Patch:
     row: int = 0
 
 
-#: Columns are torn apart where ln T or the logit differ by more; a patch begins where they differ by less.
+#: Columns are diverging where ln T or the logit differ by more; a patch begins where they differ by less.
 TORN, NEAR = 1.0, 0.03
 #: Columns of a patch, and the most generations of patches.
 INSERTED, GENERATIONS = 33, 60

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from chuteflow import display
-from chuteflow.bifurcations import seeds
+from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
 from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
@@ -33,7 +33,7 @@ from chuteflow.theory.constitutive import require_limit
 from chuteflow.threads import on_one_thread
 
 #: What can be followed.
-KINDS = seeds.KINDS
+KINDS = starting_points.KINDS
 #: Values of the parameter at which boundaries are entered, unless another number is asked for.
 SAMPLES = 13
 #: A value at which branches cannot be distinguished is moved by so many spacings, in turn.
@@ -246,13 +246,13 @@ def boundary(
             continue
         sampled.append(value)
         entered.append(tuple(branches))
-        for condition in seeds.conditions(of):
-            follow(seeds.on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
-    for condition in seeds.conditions(of):
+        for condition in starting_points.conditions(of):
+            follow(starting_points.on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
+    for condition in starting_points.conditions(of):
         for low, high in pairwise(values):
-            for value in seeds.whatever_the_flow(sweep, condition, low, high):
-                branches = seeds.branches_at(sweep, value, within)
-                follow(seeds.along_branches(sweep, condition, value, branches, tolerance), 1.0)
+            for value in starting_points.whatever_the_flow(sweep, condition, low, high):
+                branches = starting_points.branches_at(sweep, value, within)
+                follow(starting_points.along_branches(sweep, condition, value, branches, tolerance), 1.0)
     boundaries = sorted((as_boundary(of, second, b) for b in found), key=lambda b: -len(b.flows))
     return BoundarySet(
         chute=chute,
@@ -292,7 +292,7 @@ def _branches_at(
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))
         try:
-            return seeds.branches_at(sweep, beside, within), beside
+            return starting_points.branches_at(sweep, beside, within), beside
         except SolveError:
             continue
     return None, value

@@ -13,7 +13,7 @@ borders b and c near its null vectors, G and the vectors v and w solve
 and dG = -w' dA v (A. Griewank and G. W. Reddien 1984, SIAM J. Numer. Anal. 21, 176-185; W. Govaerts 2000,
 Numerical Methods for Bifurcations of Dynamical Equilibria). Since A holds first derivatives, dA v with
 respect to z is the derivative along v of w' A: one evaluation at z + i eps v, exact to rounding. A stays singular
-where a branch is born as a point or exchanges its ends with another (F_z loses rank there), and is singular
+where a branch begins as a point or exchanges its ends with another (F_z loses rank there), and is singular
 there for every m: such points are regular points of the curve G = 0.
 """
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet
 from chuteflow.bifurcations.regions import count, limits, sides
-from chuteflow.bifurcations.seeds import FOLDS
+from chuteflow.bifurcations.starting_points import FOLDS
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.quantities import PLACE
 

@@ -10,7 +10,7 @@ import numpy as np
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
 from chuteflow.bifurcations.edges import left
 from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
-from chuteflow.bifurcations.seeds import HELD
+from chuteflow.bifurcations.starting_points import HELD
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import SolveError

@@ -442,8 +442,8 @@ class Flow(Result):
             regular[0] = g.differentiate(per_fall)[0]
         else:
             regular = per_fall / state.p * span
-        glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
-        height, velocity = g.integrate(np.stack([regular, glide]))
+        shear_rate = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
+        height, velocity = g.integrate(np.stack([regular, shear_rate]))
         return height[-1] - height, self._slip + velocity[-1] - velocity
 
     def _heights(self, share: Array) -> Array:

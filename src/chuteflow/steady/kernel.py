@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.compiled import compiled
-from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, GRIP, LOSS, OFFSET, SHEAR, UPPER, WORK
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, OFFSET, SHEAR, UPPER, WALL_SHEAR, WORK
 
 #: Gauss points of an element.
 STAGES = 7
@@ -102,7 +102,7 @@ def _assemble(
     """Residuals and derivatives of all elements, condensed; the macroscopic quantities and their derivatives.
 
     ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, beta and
-    the factor of GRIP in the loss; ``ends`` (N+1, 2) theta
+    the factor of WALL_SHEAR in the loss; ``ends`` (N+1, 2) theta
     and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta,
     y and mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
@@ -194,8 +194,8 @@ def _assemble(
     p = mass + p_s
     q = mass / p
     closures(table, density_argument(p, ends[count, 0], beta), f)
-    slip = chute[4] + chute[5] * f[SHEAR] + chute[6] * f[GRIP]
-    slip_x = (chute[5] * f[8 + SHEAR] + chute[6] * f[8 + GRIP]) / slip
+    slip = chute[4] + chute[5] * f[SHEAR] + chute[6] * f[WALL_SHEAR]
+    slip_x = (chute[5] * f[8 + SHEAR] + chute[6] * f[8 + WALL_SHEAR]) / slip
     log_t = ends[count, 0] + f[GAMMA]
     if beta != 0.0:
         log_t -= beta * math.log(p)
@@ -204,9 +204,9 @@ def _assemble(
     if not (flux > 0.0 and moment > 0.0):
         return math.inf
     by_ends[0, count, 2] = (
-        slope * slip - chute[3] - chute[8] * f[GRIP]
+        slope * slip - chute[3] - chute[8] * f[WALL_SHEAR]
     )  # heat flux that the base gives, and its derivative to ln x
-    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + GRIP]
+    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + WALL_SHEAR]
     by_ends[0, count, 0] = carried * (0.5 * (1.0 - f[8 + GAMMA]) - slip_x) / flux
     by_ends[1, count, 0] = 0.0
     by_ends[0, 0, 2] = (shear_flux_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux

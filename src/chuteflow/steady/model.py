@@ -38,9 +38,9 @@ from chuteflow.theory import boundary
 from chuteflow.theory.bases import BASES, BaseCondition, base
 from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
 
-#: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
+#: Order of the functions of x in a table of closures: a, k, loss, work, shear and wall_shear as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
-CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
+CONDUCTION, COUPLING, LOSS, WORK, SHEAR, WALL_SHEAR, DENSITY, GAMMA = range(8)
 
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
@@ -179,7 +179,7 @@ class Model:
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
-        return self.base.slip(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
+        return self.base.slip(closures[SHEAR], closures[WALL_SHEAR], self.roughness, self.slope)
 
     def slip_slope(self, slopes: Array) -> Array:
         """Derivative of F1, given those of the closures: F1 is affine in them."""
@@ -188,12 +188,12 @@ class Model:
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
         flux = self.slope * self.slip(closures) - self.base_loss
-        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[GRIP]
+        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[WALL_SHEAR]
 
     def base_flux_slope(self, slopes: Array) -> Array:
         """Derivative of the flux that the base gives, given those of the closures: it is affine in them."""
         slope = self.slope * self.slip_slope(slopes)
-        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[GRIP]
+        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[WALL_SHEAR]
 
     @cached_property
     def kinks(self) -> Array:
@@ -214,7 +214,7 @@ class Model:
         """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of the two functions of the base,
         beta, and the factor of the second function in the loss, (9,)."""
         unit = np.zeros((8, 2))
-        unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
+        unit[SHEAR, 0] = unit[WALL_SHEAR, 1] = 1.0
         by_shear, by_grip = self.slip_slope(unit)
         return np.array(
             [

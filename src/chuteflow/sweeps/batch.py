@@ -39,14 +39,14 @@ _SIGNS = np.append(0.0, np.logspace(-2.5, 4.0, 60))
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Chutes of one law and one surface, arrays (n,): the slope and restitution, and F1 of (3.16), affine in
-    the closures: ``slip`` + s shear + ``slip_by_grip`` grip; ``base_loss`` is (2.15)."""
+    the closures: ``slip`` + s shear + ``slip_by_wall_shear`` wall_shear; ``base_loss`` is (2.15)."""
 
     law: Law
     surface: str
     slope: Array
     restitution: Array
     slip: Array
-    slip_by_grip: Array
+    slip_by_wall_shear: Array
     base_loss: Array
 
     @classmethod
@@ -178,7 +178,7 @@ class Pointwise:
     def slip(self) -> Array:
         """F1 of (3.16)."""
         r, b = self._reduced, self._batch
-        return b.slip + b.slope * r.shear + b.slip_by_grip * r.grip
+        return b.slip + b.slope * r.shear + b.slip_by_wall_shear * r.wall_shear
 
     @property
     def base_flux(self) -> Array:

@@ -21,7 +21,7 @@ KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES
 _ACCURACY = Accuracy(1e-10, 1e-7)
 #: Net loss within this of zero, in its largest value on the way, decides nothing.
 _DECIDES = 1e-9
-#: Quantities that are not carried along side by side: studies that ask for them are solved one by one.
+#: Quantities that are not computed in batches: studies that ask for them are solved one by one.
 ONE_BY_ONE = ("surface_velocity", "mean_volume_fraction")
 
 

@@ -89,7 +89,7 @@ class Richman(BaseCondition):
 
     def functions(self, reduced: Reduced) -> tuple[Field, Field]:
         """g1/g2 and A g1/g2, with A of (2.12) for grains and hemispheres of one size."""
-        return reduced.shear, reduced.grip
+        return reduced.shear, reduced.wall_shear
 
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1 of (3.16): with dbar = (1 + diameter)/2 for the diameter d before the shear rate in (2.10), and in A."""

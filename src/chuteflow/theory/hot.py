@@ -71,8 +71,8 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     )
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
-    grip = reduce(law, np.zeros(1), e, slope).grip
-    return Dilute(g20, g30, g40, g52, float(grip[0]) * g20)
+    wall_shear = reduce(law, np.zeros(1), e, slope).wall_shear
+    return Dilute(g20, g30, g40, g52, float(wall_shear[0]) * g20)
 
 
 @dataclass(frozen=True)
@@ -153,8 +153,8 @@ def hot_parameters(limit: Dilute, wall_restitution: float, roughness: float, slo
 
 
 def _slip(limit: Dilute, roughness: float, slope: float) -> float:
-    no_shear, grip = np.zeros(1), np.full(1, limit.A0 / limit.g20)
-    F10 = float(boundary.slip_coefficient(no_shear, grip, roughness, slope)[0])
+    no_shear, wall_shear = np.zeros(1), np.full(1, limit.A0 / limit.g20)
+    F10 = float(boundary.slip_coefficient(no_shear, wall_shear, roughness, slope)[0])
     if F10 <= 0.0:
         raise InputError(f"slip velocity F10 = {F10}: must be positive, as it is for a larger viscosity g20")
     return F10

@@ -1,4 +1,4 @@
-"""``chuteflow compare-closures``: the flows of one chute under several constitutive laws, side by side."""
+"""``chuteflow compare-closures``: the flows of one chute under several constitutive laws, compared."""
 
 from __future__ import annotations
 

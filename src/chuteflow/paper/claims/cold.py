@@ -33,7 +33,7 @@ def cold_slope_bounds(chute: Chute) -> tuple[float, float]:
     k = float(r.coupling[0] * nu / (r.stiffness[0] + r.coupling[0] * nu))
 
     def given(slope: float) -> float:
-        slip = boundary.slip_coefficient(r.shear, r.grip, chute.roughness, slope)
+        slip = boundary.slip_coefficient(r.shear, r.wall_shear, chute.roughness, slope)
         return slope * float(slip[0]) - boundary.base_loss(chute.wall_restitution, chute.roughness)
 
     def surplus(slope: float) -> float:

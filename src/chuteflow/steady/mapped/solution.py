@@ -140,8 +140,8 @@ class PointValues:
     """Functions of the fields at single points, arrays of one shape, with the scale S taken out.
 
     ``nu`` volume fraction; ``momentum`` residual of (3.8); ``flux`` phi, and ``conduction`` its part along the
-    temperature gradient; ``heating`` right-hand side of (3.9) times omega; ``stress`` p; ``base`` residual of
-    (3.17); ``surface`` residuals of the conditions at zeta = 0; ``mass`` x^2; ``glide`` s (g1/g2) x^2 y/nu, with
+    temperature gradient; ``heating`` right-hand side of (3.9) times omega; ``stress`` p; ``base`` residual of (3.17);
+    ``surface`` residuals of the conditions at zeta = 0; ``mass`` x^2; ``scaled_shear_rate`` s (g1/g2) x^2 y/nu, with
     du/dz = scaled_shear_rate/S^(1/2); ``slip`` F1 y; ``dissipation`` g5/nu^2.
     """
 

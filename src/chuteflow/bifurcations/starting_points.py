@@ -3,7 +3,7 @@
 # notation: sigma runs from 0 to 1 along the chord between two successive flows of a branch in the plane
 # (ln M, ln T_surface).
 
-A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
+A boundary that begins and ends between two values, as the two folds that begin at a cusp, has no point at
 either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
 from the ends of branches, the parameter is moved until the condition holds.
 """
@@ -41,9 +41,9 @@ _BEYOND, _BESIDE = 0.02, 1.0
 _HALVINGS = 6
 #: A boundary beside the branches is looked for as far as so many times the distance to go to it.
 _FARTHER = 1.5
-#: A walk there goes by at most this fraction of the distance at once, so many times, with flows solved to this
+#: A step towards it covers at most this fraction of the distance at once, so many times, with flows solved to this
 #: tolerance, and ends where so small a fraction is left.
-_STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+_STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
 #: Net loss below this is none.
@@ -234,7 +234,7 @@ def _beside(
     row = np.array([chord[1], chord[0], 0.0])
     plane = Condition.plane(chord, solution.macroscopic)
     at = value
-    for _ in range(_WALK):
+    for _ in range(_MOST_STEPS):
         w = np.append(solution.z, at)
         system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
         ahead = at + shift(system, w, row)
