@@ -21,6 +21,7 @@ import hashlib
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -308,6 +309,12 @@ def require_positive(law: Law, e: float, slope: float) -> None:
     Raises:
         InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
+    _require_positive(law, e, slope if law.knows_slope else 1.0)
+
+
+# Maps ask for thousands of chutes of the same grains.
+@lru_cache(maxsize=256)
+def _require_positive(law: Law, e: float, slope: float) -> None:
     nu, _, g = law.at(_TRIED, e, slope)
     if not isinstance(g, Coefficients):
         raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")
