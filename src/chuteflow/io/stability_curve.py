@@ -60,7 +60,7 @@ def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
 def change_words(change: Change, chute: Chute, scales: Scales | None) -> str:
     """Where stability changes, and how well that is known."""
     scale = factor("surface_temperature", chute, scales)
-    what = "neutral" if change.neutral else "the verdict changes"
+    what = "neutral" if change.neutral else "stability changes"
     T, error = change.flow.surface_temperature * scale, change.error * scale
     return f"{what} at T_surface = {T:.6g} +- {error:.1g}"
 
