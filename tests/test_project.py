@@ -313,6 +313,28 @@ def test_pictures_compute_nothing():
     assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count"}
 
 
+def class_names(sources: dict[str, str]) -> dict[str, list[str]]:
+    """The modules that define a class of each name; a leading underscore makes no other name of one."""
+    found: dict[str, list[str]] = {}
+    for module, source in sources.items():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name.lstrip("_"), []).append(module)
+    return found
+
+
+def test_a_class_name_has_one_meaning():
+    names = class_names({module: path.read_text(encoding="utf-8") for module, path in MODULES.items()})
+    assert {name: modules for name, modules in names.items() if len(modules) > 1} == {}
+
+
+def test_a_class_name_with_two_meanings_is_seen():
+    assert class_names({"a": "class Point: ...", "b": "class _Point: ...\nclass Line: ..."}) == {
+        "Point": ["a", "b"],
+        "Line": ["b"],
+    }
+
+
 def test_only_the_command_line_prints():
     calls = [
         f"{module}, line {node.lineno}"

@@ -13,7 +13,7 @@ from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import model
 from chuteflow.steady.solver import (
     Condition,
-    Status,
+    SolverStatus,
     checked_tolerance,
     resolve,
     solve,
@@ -64,7 +64,7 @@ def test_a_poor_start_leads_to_a_flow_or_to_none():
     condition = Condition.fix(LOG_T, 7.0)
     first, second = (solve(start, condition) for start in (good, replace(good, ends=ends)))
     assert first.converged
-    assert second.converged or second.status is Status.NO_CONVERGENCE
+    assert second.converged or second.status is SolverStatus.NO_CONVERGENCE
     if second.converged:
         np.testing.assert_allclose(first.macroscopic, second.macroscopic, atol=1e-9)
 
@@ -73,7 +73,7 @@ def test_no_solution_is_data_not_an_exception():
     steady = model(Chute(0.2, 0.8, 0.8, 0.85))  # base and interior both lose energy
     start = Elements.sample(steady, 0.5, 0.0, np.linspace(0.0, 1.0, 9), lambda s: np.stack([0.1 * s, 0.0 * s], axis=1))
     solution = solve(start, Condition.fix(LOG_T, 1.0))
-    assert solution.status is Status.NO_CONVERGENCE
+    assert solution.status is SolverStatus.NO_CONVERGENCE
     assert not solution.converged
     assert "start from a nearer flow" in solution.status.value
 

@@ -39,7 +39,7 @@ _MOST_NODES = 800
 _SETTLED, _MOST_HALVINGS = 1e-11, 4
 
 
-class Status(Enum):
+class SolverStatus(Enum):
     """How a solution ended; each value is a sentence that says what to try."""
 
     CONVERGED = "converged"
@@ -49,7 +49,7 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Condition:
-    """Which flow of a family: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
+    """Which flow of a branch: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
 
     weights: tuple[float, float, float, float]
     value: float
@@ -78,14 +78,14 @@ class Solution:
 
     macroscopic: Array
     error: float
-    status: Status
+    status: SolverStatus
     source: Elements | tuple[Collocation, Array] | Law
     rates: Array | None = None
 
     @property
     def converged(self) -> bool:
         """Whether the tolerance was reached."""
-        return self.status is Status.CONVERGED
+        return self.status is SolverStatus.CONVERGED
 
     @cached_property
     def elements(self) -> Elements:
@@ -235,11 +235,11 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
         change = float(np.abs(fine.quantities - coarse.quantities).max())
         noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors).max()))
         if change < max(tolerance, noise):
-            return Solution(fine.quantities, max(change, noise), Status.CONVERGED, fine.flow, fine.rates)
+            return Solution(fine.quantities, max(change, noise), SolverStatus.CONVERGED, fine.flow, fine.rates)
         if len(fine.flow.slopes) > MOST_ELEMENTS:
-            return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
+            return Solution(fine.quantities, np.inf, SolverStatus.UNRESOLVED, fine.flow)
         coarse = fine
-    return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
+    return Solution(np.full(4, np.nan), np.inf, SolverStatus.NO_CONVERGENCE, start)
 
 
 def _iterated(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:

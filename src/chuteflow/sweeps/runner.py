@@ -112,7 +112,7 @@ def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marke
         WorkerError: where workers cannot start.
     """
     deaths: Counter[int] = Counter()
-    left = _Left(iter(chunks), store)
+    left = _RemainingChunks(iter(chunks), store)
     while True:
         with workers.start() as executor:
             broken = yield from _until_broken(store, left, executor, workers, deaths)
@@ -120,7 +120,7 @@ def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marke
             return
 
 
-class _Left:
+class _RemainingChunks:
     """The chunks that are still to be handed out, those that came back first."""
 
     def __init__(self, chunks: Iterator[int], store: Store) -> None:
@@ -140,7 +140,7 @@ class _Left:
 
 
 def _until_broken(
-    store: Store, left: _Left, executor: Executor, workers: Workers, deaths: Counter[int]
+    store: Store, left: _RemainingChunks, executor: Executor, workers: Workers, deaths: Counter[int]
 ) -> Iterator[Marker]:
     """Hand out chunks until none is left, which returns False, or the workers have died, which returns True."""
     out: dict[Future[Marker], int] = {}

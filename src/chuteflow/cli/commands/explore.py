@@ -16,7 +16,7 @@ _ANY = ("0.0.0.0", "::")
 
 @click.command("explore", help=COMMANDS["explore"])
 @click.option("--port", type=click.IntRange(0, 65535), help="Port; 8765 or another free one by default, 0 for any.")
-@options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, this machine alone, by default.")
+@options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, only this machine, by default.")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 def command(port: int | None, host: str | None, no_browser: bool) -> None:
     """Serve until interrupted."""
