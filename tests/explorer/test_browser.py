@@ -612,3 +612,39 @@ def test_latency_from_slider_to_redraw(whole_page):
     # on which dragging no longer works, whatever else goes on.
     assert middle["flows-redraw"] < 10 * 50.0, middle
     assert middle["curve-redraw"] < 10 * 150.0, middle
+
+
+def test_a_drag_is_one_step_to_take_back(page):
+    opened(page)
+    expect(page.locator("#undo")).to_have_attribute("aria-disabled", "true")
+    drag(page, page.locator("#slope-slider"), (0.38, 0.5), (0.36, 0.5))
+    slope = page.locator("#slope").input_value()
+    page.wait_for_url(f"**slope={slope}**")
+    drag(page, page.locator("#e-slider"), (0.6, 0.5), (0.62, 0.5))
+    page.wait_for_url(lambda url: "e=0.8&" not in url)
+    page.go_back()
+    expect(page.locator("#e")).to_have_value("0.8")
+    expect(page.locator("#command")).to_contain_text(f"--slope {slope} --e 0.8 ")
+    page.locator("#undo").click()
+    expect(page.locator("#slope")).to_have_value("0.3")
+    expect(page.locator("#undo")).to_have_attribute("aria-disabled", "true")
+    page.keyboard.press("Control+Shift+Z")
+    expect(page.locator("#slope")).to_have_value(slope)
+    page.locator("#surface").focus()
+    page.keyboard.press("Control+Z")
+    expect(page.locator("#slope")).to_have_value("0.3")
+
+
+def test_the_chosen_case_is_shown_as_long_as_it_holds(page):
+    opened(page)
+    shown = page.locator("#presets option:checked")
+    expect(shown).to_contain_text("Three flows at one flux")
+    page.locator("#presets").select_option(label="glass-beads")
+    expect(page.locator("#e")).to_have_value("0.97")
+    expect(page.locator("#d")).to_have_value("3")
+    expect(page.locator("#case-words")).to_contain_text("Guessed: roughness")
+    page.locator("#slope-slider").press("ArrowRight")
+    expect(shown).to_have_text("glass-beads")
+    page.locator("#e-slider").press("ArrowRight")
+    expect(shown).to_have_text("own numbers")
+    expect(page.locator("#case-words")).to_be_empty()

@@ -10,6 +10,7 @@ from chuteflow.checks import number_in
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
+from chuteflow.steady.cases import CASES, GUESSED, Case
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.quantities import Scales
 from chuteflow.theory.laws import LAWS, runs_code
@@ -82,10 +83,11 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Preset:
-    """A case worth looking at."""
+    """A case worth looking at: what it sets of the page's state, and ``words`` on how its numbers are known."""
 
     title: str
     state: Mapping[str, float | str]
+    words: str = ""
 
 
 _BASE = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun", "Q": 3.0}
@@ -102,6 +104,26 @@ PRESETS = (
     Preset("Heat by Fourier's law alone (figures 15 to 17)", _BASE | {"closure": "lun-fourier"}),
     Preset("Too steep for hot flows (figure 14)", _BASE | {"slope": 0.45}),
 )
+
+
+def cases() -> list[Preset]:
+    """The chutes and materials of ``chuteflow cases``, with their grains."""
+    return [Preset(one.name, _state(one), _known(one)) for one in CASES.values()]
+
+
+def _state(one: Case) -> dict[str, float | str]:
+    """What a case says, by the names of the page's state; its grains have a diameter in mm."""
+    said: dict[str, float | str] = {key: known.value for key, known in one.numbers.items()} | dict(one.names)
+    grains = one.scales
+    return said if grains is None else said | {"d": round(1e3 * grains.diameter, 12), "rho": grains.density}
+
+
+def _known(one: Case) -> str:
+    numbers = {**one.numbers, **one.grains}
+    guessed = [key for key, known in numbers.items() if known.how == GUESSED]
+    told = f" Guessed: {', '.join(guessed)}; put your own in their place." if guessed else ""
+    return f"{one.name}: {one.description}.{told}"
+
 
 _DEFAULTS = {"surface": SURFACES[0], "closure": next(iter(LAWS))}
 

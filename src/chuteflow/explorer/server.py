@@ -158,7 +158,8 @@ async def _about(_: Request) -> Response:
         {
             "version": __version__,
             "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
-            "presets": [{"title": preset.title, "state": dict(preset.state)} for preset in queries.PRESETS],
+            "presets": [asdict(preset) for preset in queries.PRESETS],
+            "cases": [asdict(case) for case in queries.cases()],
             "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
             "quantities": {
                 quantity.symbol: {

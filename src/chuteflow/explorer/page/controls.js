@@ -6,7 +6,8 @@ import { factor, unit } from "./units.js";
 
 const steps = 1000;
 const controls = {};
-let set = null, choices = {};
+const offered = [];
+let set = null, choices = {}, latest = null;
 
 /** The place of a slider that is nearest to a value. */
 function position({ low, high, logarithmic }, value) {
@@ -26,15 +27,40 @@ export function makeControls(about, setter) {
   choices = about.choices;
   for (const [name, choice] of Object.entries(choices)) makeChoice(name, choice);
   byId("controls").addEventListener("submit", (event) => event.preventDefault());
-  about.presets.forEach((preset, i) => byId("presets").append(new Option(preset.title, i)));
-  byId("presets").addEventListener("change", (event) => {
-    if (event.target.value !== "") set({ ...about.presets[event.target.value].state, flow: 0 }, event);
-    event.target.value = "";
-  });
+  makeCases(about);
   takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
   takeTyped("rho", "density of the grains", (typed) => (typed > 0 ? { rho: typed } : null), "a number above 0");
   for (const name of ["theme", "against"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
   for (const name of ["si", "whole"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
+}
+
+/** Cases to choose from, in groups; which of them the controls show is seen from their numbers. */
+function makeCases({ presets, cases }) {
+  const groups = [["Views of the paper", presets], ["Chutes and materials", cases]];
+  for (const [label, those] of groups) {
+    const group = Object.assign(document.createElement("optgroup"), { label });
+    for (const one of those) {
+      group.append(new Option(one.title, String(offered.length)));
+      offered.push({ words: "", ...one });
+    }
+    byId("presets").append(group);
+  }
+  addControl('<p id="case-words"></p>');
+  byId("presets").addEventListener("change", (event) => {
+    const one = offered[event.target.value];
+    if (!one) { showCase(); return; }
+    latest = one;
+    set({ ...one.state, flow: 0 }, event);
+    showCase();
+  });
+}
+
+/** The case that was chosen last, if it still holds, or the first that holds: all that it says is so. */
+function showCase() {
+  const holds = (one) => Object.entries(one.state).every(([name, value]) => state[name] === String(value));
+  const found = latest && holds(latest) ? latest : offered.find(holds);
+  byId("presets").value = found ? String(offered.indexOf(found)) : "";
+  byId("case-words").textContent = found?.words ?? "";
 }
 
 function addControl(markup) {
@@ -93,6 +119,7 @@ export function showControls() {
     field.value = fieldText(shown);
     slider.value = String(position(control, value));
     slider.setAttribute("aria-valuetext", `${number(shown)} ${units}`.trim());
+    field.dataset.shown = field.value;
     byId(`${name}-unit`).textContent = units || "–";
     byId(`${name}-unit`).title = units ? "" : "dimensionless";
   }
@@ -101,6 +128,7 @@ export function showControls() {
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
   for (const name of ["si", "whole"]) byId(name).checked = Boolean(state[name]);
   byId("grains").hidden = !state.si;
+  showCase();
 }
 
 /** The flux, or NaN where the state has none that can be. */

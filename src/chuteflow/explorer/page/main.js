@@ -8,7 +8,7 @@ import * as map from "./map.js";
 import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
-import { address, change, chute, grains, ofChute, ofLooks, onChange, start, state, write } from "./state.js";
+import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, start, state, undo, write } from "./state.js";
 import { factor, setQuantities, unit } from "./units.js";
 
 const about = await (await fetch("about")).json();
@@ -154,11 +154,29 @@ for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEve
   setTimeout(() => { byId("copied").textContent = ""; }, 2500);
 });
 
+// --- steps back and forth ---------------------------------------------------------------------------------------
+
+for (const [id, step] of [["undo", undo], ["redo", redo]]) byId(id).addEventListener("click", step);
+function showSteps() {
+  for (const [id, can] of [["undo", canUndo()], ["redo", canRedo()]]) byId(id).setAttribute("aria-disabled", String(!can));
+}
+onSteps(showSteps);
+addEventListener("keydown", (event) => {
+  const key = event.key.toLowerCase(), step = key === "y" || event.shiftKey ? redo : undo;
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || (key !== "z" && key !== "y")) return;
+  // What is being typed has an undo of its own.
+  const { dataset, value } = event.target;
+  if (dataset.shown !== undefined && dataset.shown !== value) return;
+  event.preventDefault();
+  step();
+});
+
 // --- the beginning ----------------------------------------------------------------------------------------------
 
 document.documentElement.dataset.theme = state.theme;
 makeControls(about, set);
 showControls();
+showSteps();
 curve.begin(set);
 map.begin(about, set);
 function redraw() { forgetColours(); showFlows(); map.redraw(); }

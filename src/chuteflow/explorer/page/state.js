@@ -11,13 +11,17 @@ const allowed = {
   si: ["", "1"], whole: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
   shade: ["most", "families", "density", "interior"],
 };
-let first = {}, due = null;
+// What holds the state back from the address: a finger or button that is down, or changes within the last moments.
+const rest = 250;
+let first = {}, due = null, held = false, written = "", newest = 0, told = () => {};
 export const state = {};
 
 /** Take the state of the address, over the defaults and over `preset`. */
 export function start(preset) {
   first = { ...defaults, ...Object.fromEntries(Object.entries(preset).map(([name, value]) => [name, String(value)])) };
   Object.assign(state, fromAddress());
+  written = address();
+  newest = place();
 }
 
 function fromAddress() {
@@ -32,12 +36,25 @@ export function change(parts) {
   if (!changed.length) return;
   for (const name of changed) state[name] = String(parts[name]);
   for (const listen of listeners) listen((...names) => names.some((name) => changed.includes(name)));
-  // Browsers allow some hundred changes of the address in half a minute: wait until a drag pauses.
-  clearTimeout(due);
-  due = setTimeout(write, 120);
+  wait();
 }
 
-addEventListener("popstate", () => change(fromAddress()));
+/** One step back is one drag, not each of its places: the address is written when all rests. */
+function wait() {
+  clearTimeout(due);
+  due = setTimeout(() => { if (held) wait(); else write(); }, rest);
+  told();
+}
+
+addEventListener("pointerdown", () => { held = true; }, true);
+for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => { held = false; }, true);
+addEventListener("popstate", () => {
+  change(fromAddress());
+  clearTimeout(due);
+  due = null;
+  written = address();
+  told();
+});
 
 /** `listen` is called after each change with a function that tells whether any of some names changed. */
 export function onChange(listen) { listeners.push(listen); }
@@ -47,10 +64,33 @@ export function address() {
   return `${location.pathname}?${new URLSearchParams(shown)}`;
 }
 
+/** Put the state into the address, as a step that can be taken back. */
 export function write() {
   clearTimeout(due);
-  history.replaceState(null, "", address());
+  due = null;
+  if (address() !== written) {
+    written = address();
+    newest = place() + 1;
+    // Browsers allow some hundred steps in half a minute, and none where the page may not know its address.
+    try { history.pushState({ place: newest }, "", address()); } catch { /* then there is nothing to take back */ }
+  }
+  told();
 }
+
+const place = () => history.state?.place ?? 0;
+
+/** `listen` is called whenever `canUndo` or `canRedo` may have changed. */
+export function onSteps(listen) { told = listen; }
+export const canUndo = () => due !== null || place() > 0;
+export const canRedo = () => due === null && place() < newest;
+
+/** Take back the last step. */
+export function undo() {
+  if (due !== null) write();
+  if (canUndo()) history.back();
+}
+
+export function redo() { if (canRedo()) history.forward(); }
 
 /** The parameters of the chute, for a question. */
 export const chute = () => Object.fromEntries(material.map((name) => [name, state[name]]));
