@@ -303,7 +303,7 @@ def test_flows_beyond_the_theory_are_marked(page):
     def drawn(route):
         answer = route.fetch().json()
         (branch,) = answer["branches"]
-        branch["validity"] = {"words": [["large slip"] if q < 1.0 else [] for q in branch["Q"]]}
+        branch["validity"] = {"words": [["large slip"] if q > 6.0 else [] for q in branch["Q"]]}
         route.fulfill(json=answer)
 
     page.route("**/ask/flows?*", told)
@@ -313,7 +313,9 @@ def test_flows_beyond_the_theory_are_marked(page):
     expect(page.locator("#profile-nu .beneath")).to_have_count(1)
     expect(page.locator("#profile-nu .line")).to_have_count(3)
     expect(page.locator("#curve .beneath")).to_have_count(1)
-    expect(page.locator("#beyond")).to_be_visible()
+    expect(page.locator("#beyond")).to_contain_text("large slip (u_base above sqrt(T_base)")
+    expect(page.locator("#curve .limit")).to_have_count(1)
+    assert page.locator("#curve .limit title").text_content() in ("large slip", "within the theory")
 
 
 def test_the_surface_temperature_is_called_what_it_is(page):
@@ -648,3 +650,39 @@ def test_the_chosen_case_is_shown_as_long_as_it_holds(page):
     page.locator("#e-slider").press("ArrowRight")
     expect(shown).to_have_text("own numbers")
     expect(page.locator("#case-words")).to_be_empty()
+
+
+def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
+    def judged(route):
+        query = parse_qs(urlsplit(route.request.url).query)
+        if "point" not in query:
+            route.fulfill(json={"state": "unknown", "says": "not known", "waves": ""})
+            return
+        asked.append(int(query["point"][0]))
+        state = ("stable", "unstable", "unknown")[len(asked) % 3]
+        searched = [2.0 + len(asked), 100.0 - len(asked)]
+        route.fulfill(json={"state": state, "says": f"it is {state}", "waves": "", "searched": searched})
+
+    asked = []
+    page.unroute("**/ask/stability?*")
+    page.route("**/ask/stability?*", judged)
+    opened(page)
+    said = page.locator("#judged")
+    expect(said).to_have_text(
+        "Stability of 9 flows of the curve: × unstable (3), ■ stable (3), ? not known (3). Between them nothing is known. "
+        "Each was held against at least the waves of 11 to 91 d."
+    )
+    assert len(set(asked)) == 9
+    assert page.locator("#curve .verdict").count() == 9
+    assert page.locator("#curve .verdict.stable title").all_text_contents() == ["it is stable"] * 3
+    page.locator("#judge").uncheck()
+    expect(said).to_have_text("Stability along the curve is not looked at.")
+    expect(page.locator("#curve .verdict")).to_have_count(0)
+    page.locator("#judge").check()
+    expect(page.locator("#curve .verdict")).to_have_count(9)
+    page.locator("#Q-slider").press("ArrowRight")
+    expect(said).to_contain_text("Stability of 9 flows")
+    # Where the question cannot be posed, it is asked once.
+    page.unroute("**/ask/stability?*")
+    page.locator("#surface").select_option("interface")
+    expect(said).to_contain_text("Stability of 1 flows of the curve, 8 to come: × unstable (0)", timeout=20_000)

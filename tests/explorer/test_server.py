@@ -424,3 +424,17 @@ def fetched(page, path):
         content = response.read()
     assert response.status == 200 or "error" in json.loads(content)
     return response.status
+
+
+def test_stability_is_of_the_flow_of_the_curve_that_was_asked_for(monkeypatch):
+    judged = []
+    monkeypatch.setattr(growth, "verdict", lambda flow: judged.append(flow) or growth.Verdict("stable", (2.0, 50.0)))
+    query = {"slope": "0.3", "e": "0.8", "ew": "0.8", "roughness": "0.6"}
+    branch = json.loads(answers.answer("curve", query).body)["branches"][0]
+    given = json.loads(answers.answer("stability", query | {"branch": "0", "point": "40"}).body)
+    assert given["says"] == "stable: no wave grows"
+    assert judged[0].mass_flux == pytest.approx(branch["Q"][40], rel=1e-6)
+    assert judged[0].centre_of_mass == pytest.approx(branch["h"][40], rel=1e-6)
+    refused = answers.answer("stability", query | {"branch": "0", "point": "90"})
+    assert refused.status == 400
+    assert b"there are 90, counted from 0" in refused.body

@@ -6,6 +6,7 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ import numpy as np
 
 from chuteflow.branches.curve import curve
 from chuteflow.branches.enumeration import flows
-from chuteflow.branches.results import KINDS, Branch
+from chuteflow.branches.results import KINDS, Branch, Curve
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
 from chuteflow.io import contract
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
@@ -162,13 +164,19 @@ def _short(values: np.ndarray) -> list[float]:
 def _curve(query: Query) -> Answer:
     chute, other = queries.read(query, optional=GRAINS)
     scales = queries.scales(other)
-    found = curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
+    found = _drawn(chute)
     content = contract.curve_object(found)
     for branch, entry in zip(found.branches, content["branches"], strict=True):
         entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
         # The page shows where the limits are passed, without the numbers behind it.
         entry["validity"] = {"words": entry["validity"]["words"]}
     return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
+
+
+@lru_cache(maxsize=4)
+def _drawn(chute: Chute) -> Curve:
+    """The curve as the page draws it; its flows are told by their numbers."""
+    return curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
 
 
 def _rounded(branch: Branch) -> dict[str, list[float]]:
@@ -184,13 +192,17 @@ def _map(query: Query) -> Answer:
 def _stability(query: Query) -> Answer:
     from chuteflow.explorer.growth import verdict
 
-    chute, other = queries.read(query, other=("Q", "flow"), optional=GRAINS)
+    at_flux = "branch" not in query
+    chute, other = queries.read(query, other=("Q", "flow") if at_flux else ("branch", "point"), optional=GRAINS)
     scales = queries.scales(other)
-    found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
-    number = other["flow"]
-    if number not in map(str, range(len(found))):
-        raise InputError(f"flow = {number[:40]!r}: there are {len(found)} flows, counted from 0")
-    known = verdict(found[int(number)])
+    if at_flux:
+        found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
+        flow = found[queries.place("flow", other, len(found))]
+    else:
+        branches = _drawn(chute).branches
+        branch = branches[queries.place("branch", other, len(branches))]
+        flow = branch.flows[queries.place("point", other, len(branch.flows))]
+    known = verdict(flow)
     says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
     return _json(asdict(known) | {"says": says, "waves": waves})
 

@@ -161,6 +161,17 @@ def flux(text: str) -> float:
     return number_in("Q", text, *FLUX_RANGE)
 
 
+def place(name: str, given: Query, count: int) -> int:
+    """The place of a query among so many, counted from 0.
+
+    Raises:
+        InputError: for one that there is not.
+    """
+    if given[name] not in map(str, range(count)):
+        raise InputError(f"{name} = {given[name][:40]!r}: there are {count}, counted from 0")
+    return int(given[name])
+
+
 def scales(given: Query) -> Scales | None:
     """The scales of the grains of a query, or None where it names none.
 

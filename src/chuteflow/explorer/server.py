@@ -24,6 +24,7 @@ from chuteflow.explorer.answers import QUESTIONS, Answer, answer
 from chuteflow.explorer.scheduler import Scheduler
 from chuteflow.explorer.worker import Compute
 from chuteflow.steady.quantities import QUANTITIES
+from chuteflow.steady.validity import WORDS
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -160,6 +161,7 @@ async def _about(_: Request) -> Response:
             "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
             "presets": [asdict(preset) for preset in queries.PRESETS],
             "cases": [asdict(case) for case in queries.cases()],
+            "validity": WORDS,
             "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
             "quantities": {
                 quantity.symbol: {

@@ -63,10 +63,15 @@ function path(points, sx, sy) {
 /** A label as markup of SVG: what follows "_" is set lower. */
 const lowered = (label) => escaped(label).replace(/_(\w+)(.*)/, '<tspan dy="3" font-size="9">$1</tspan><tspan dy="-3">$2</tspan>');
 
+/** Marks as the beginning of an element, whose title and end follow. */
 const shapes = {
   circle: (x, y) => `<circle class="special" cx="${x}" cy="${y}" r="4.5">`,
   diamond: (x, y) => `<path class="special" d="M${x} ${y - 5.5}l5.5 5.5l-5.5 5.5l-5.5-5.5z">`,
   triangle: (x, y) => `<path class="special" d="M${x - 5} ${y - 4}h10l-5 9z">`,
+  bar: (x, y) => `<path class="limit" d="M${x} ${y - 7}v14">`,
+  unstable: (x, y) => `<path class="verdict unstable" d="M${x - 4} ${y - 4}l8 8m-8 0l8-8">`,
+  stable: (x, y) => `<path class="verdict stable" d="M${x - 4} ${y - 4}h8v8h-8z">`,
+  unknown: (x, y) => `<text class="verdict unknown" x="${x}" y="${y + 4}" text-anchor="middle">?`,
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
 };
 
@@ -112,7 +117,7 @@ export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = []
   if (known([sx(hair), 0])) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
   for (const mark of marks.filter((one) => known([sx(one.x), sy(one.y)]))) {
     const shape = shapes[mark.shape](Number(sx(mark.x).toFixed(1)), Number(sy(mark.y).toFixed(1)), mark);
-    inside.push(`${shape}<title>${escaped(mark.title)}</title>${shape.startsWith("<path") ? "</path>" : "</circle>"}`);
+    inside.push(`${shape}<title>${escaped(mark.title)}</title></${shape.match(/\w+/)[0]}>`);
   }
   svg.innerHTML = `<pattern id="${svg.id}-hatch" class="hatch" width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M3 0V7"/></pattern>
     <clipPath id="${svg.id}-clip"><rect x="${box.l - 8}" y="${box.t - 8}" width="${Math.max(0, box.r - box.l + 16)}" height="${box.b - box.t + 8}"/></clipPath>

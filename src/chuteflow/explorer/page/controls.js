@@ -31,7 +31,7 @@ export function makeControls(about, setter) {
   takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
   takeTyped("rho", "density of the grains", (typed) => (typed > 0 ? { rho: typed } : null), "a number above 0");
   for (const name of ["theme", "against"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
-  for (const name of ["si", "whole"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
+  for (const name of ["si", "whole", "judge"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
 }
 
 /** Cases to choose from, in groups; which of them the controls show is seen from their numbers. */
@@ -126,7 +126,7 @@ export function showControls() {
   byId("angle").value = fieldText(degrees(Number(state.slope)));
   for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
-  for (const name of ["si", "whole"]) byId(name).checked = Boolean(state[name]);
+  for (const name of ["si", "whole", "judge"]) byId(name).checked = Boolean(state[name]);
   byId("grains").hidden = !state.si;
   showCase();
 }

@@ -1,9 +1,9 @@
 // The curve of all flows, folds and all: flows at the flux as points to choose, and the curve itself to drag.
-import { draw } from "./chart.js";
+import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
 import { change, state } from "./state.js";
-import { factor, labelled } from "./units.js";
+import { factor, labelled, unit } from "./units.js";
 
 const svg = byId("curve");
 /** What the curve is drawn against; the surface temperature is one thing on the half-line and another beneath an interface. */
@@ -12,17 +12,25 @@ const nameOf = (quantity) => ({
   T_surface: state.surface === "interface" ? "T_surface, at the interface" : "T_surface, far above",
 })[quantity];
 const shapes = { "fold-Q": "circle", "fold-M": "circle", "fold-T": "circle", "density-inversion": "diamond", "interior-change": "triangle" };
-let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null;
+// Flows of each branch that are judged, as far as they are in the frame.
+const judgedOfBranch = 9;
+let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null, limits = {};
+// What is known about the stability of flows of the curve, by branch and place on it.
+let verdicts = new Map();
 // While the curve is dragged: ln of the quantity where the pointer is.
 let held = null;
 
-/** `setter` (parts, event) changes the state. */
-export function begin(setter) { set = setter; }
+/** `setter` (parts, event) changes the state; `validity` has the words for what passes a limit, and what they mean. */
+export function begin(setter, validity) {
+  set = setter;
+  limits = validity;
+}
 
 /** The curve, or why it is left out. */
 export function takeCurve(answer) {
   curve = answer.error ? { branches: [], says: "", why: answer.error } : answer;
   byId("count").textContent = curve.says;
+  verdicts = new Map();
   redraw();
 }
 
@@ -75,27 +83,81 @@ function linesOf(branch, at) {
   return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends) }))];
 }
 
+/** Where the words on a branch change: the first point of each stretch but the first. */
+const changes = (branch) => [...stretches(branch, (i) => branch.validity.words[i]?.join())].slice(1).map(([i]) => i + 1);
+const words = (branch, i) => branch.validity.words[i]?.join(", ") || "within the theory";
+
+/** What the shades mean: the words of the stretches that are drawn. */
+function tellLimits() {
+  const seen = new Set(curve.branches.flatMap((b) => b.validity.words.filter((_, i) => inFrame(b, i)).flat()));
+  byId("beyond").textContent = seen.size ? `Shaded: beyond what the theory takes for granted, which changes at a bar: ${[...seen].map((word) => `${word} (${limits[word]})`).join("; ")}.` : "";
+}
+
+const inFrame = (branch, i) => ["x", "y"].every((axis) => {
+  const value = branch[axis === "x" ? "Q" : state.against][i];
+  return value >= frame[axis].low && value <= frame[axis].high;
+});
+
+/** Flows of the curve that are to be judged and are not yet: evenly along each branch in the frame, the middle first. */
+export function unjudged() {
+  if (!frame || !state.judge) return [];
+  const wanted = curve.branches.flatMap((branch, b) => {
+    const inside = branch.Q.map((_, i) => i).filter((i) => inFrame(branch, i)), count = Math.min(judgedOfBranch, inside.length);
+    const chosen = Array.from({ length: count }, (_, k) => inside[Math.round(((k + 0.5) / count) * inside.length - 0.5)]);
+    return chosen.map((point, k) => ({ branch: b, point, turn: (k * 4) % count }));
+  });
+  return wanted.filter(({ branch, point }) => !verdicts.has(`${branch}:${point}`)).sort((a, b) => a.turn - b.turn);
+}
+
+/** What is known about a flow of the curve; `more` are still to come. */
+export function judge({ branch, point }, verdict) {
+  verdicts.set(`${branch}:${point}`, { branch, point, ...verdict });
+  redraw();
+}
+
+/** Marks of the flows that were judged, and in words how many, and against which waves. */
+function judged(at) {
+  const all = state.judge ? [...verdicts.values()].filter(({ branch, point }) => inFrame(curve.branches[branch], point)) : [];
+  byId("judged").textContent = sayJudged(all);
+  return all.map(({ branch, point, state: shape, says }) => ({ ...at(curve.branches[branch], point), shape, title: says }));
+}
+
+function sayJudged(all) {
+  if (!state.judge) return "Stability along the curve is not looked at.";
+  const count = (kind) => all.filter((one) => one.state === kind).length, left = unjudged().length;
+  const counts = `× unstable (${count("unstable")}), ■ stable (${count("stable")}), ? not known (${count("unknown")})`;
+  const searched = all.map((one) => one.searched).filter(Boolean), s = factor("h"), units = unit("h") || "d";
+  const waves = searched.length ? ` Each was held against at least the waves of ${number(Math.max(...searched.map(([low]) => low)) * s, 2)} to ${number(Math.min(...searched.map(([, high]) => high)) * s, 2)} ${units}.` : "";
+  const why = all.length && !searched.length ? ` ${sentence(all[0].reason ?? all[0].says)}` : "";
+  return `Stability of ${all.length} flows of the curve${left ? `, ${left} to come` : ""}: ${counts}. Between them nothing is known.${waves}${why}`;
+}
+
 export function redraw() {
   if (!curve) return;
   settle();
   if (!frame) {
     svg.innerHTML = "";
+    byId("judged").textContent = "";
+    byId("beyond").textContent = "";
     byId("curve-words").textContent = curve.why ? sentence(curve.why) : "No curve: this chute has no flows in the range searched.";
     shown = null;
     return;
   }
   byId("curve-words").textContent = "";
   const name = state.against, sq = factor("Q"), sn = factor(name), lines = [], marks = [];
+  const at = (branch, i) => ({ x: branch.Q[i] * sq, y: branch[name][i] * sn });
   const axis = ({ low, high, log }, s, label) => ({ low: low * s, high: high * s, log, label });
   for (const branch of curve.branches) {
     lines.push(...linesOf(branch, (i) => [branch.Q[i] * sq, branch[name][i] * sn]));
     for (const s of branch.special) marks.push({ x: s.Q * sq, y: s[name] * sn, shape: shapes[s.kind] ?? "circle", title: curve.kinds[s.kind] ?? s.kind });
+    for (const i of changes(branch)) marks.push({ ...at(branch, i), shape: "bar", title: words(branch, i) });
   }
+  marks.push(...judged(at));
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
   shown = draw(svg, {
     x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), lines, marks, hair: flux() * sq,
   });
-  byId("beyond").hidden = !lines.some((line) => line.beneath);
+  tellLimits();
   svg.setAttribute("aria-valuenow", String(fluxWithin(Number(state.Q) || 0) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
   svg.setAttribute("aria-valuemax", String(frame.x.high * sq));

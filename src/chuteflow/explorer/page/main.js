@@ -38,7 +38,10 @@ const asks = {
     stability.restart(flows.flows.length);
     showFlows();
   })),
-  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
+  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => {
+    curve.takeCurve(answer);
+    stability.again();
+  })),
 };
 
 const refused = {};
@@ -79,7 +82,8 @@ onChange((has) => {
   if (ofChute(has) || has("Q") || words) askFlows();
   if (ofChute(has) || words) askCurve();
   showControls();
-  if (has("Q", "against", "whole")) curve.redraw();
+  if (has("Q", "against", "whole", "judge")) curve.redraw();
+  if (has("against", "whole", "judge")) stability.again();
   if (has("flow") || ofLooks(has)) showFlows();
   map.changed(has);
 });
@@ -177,7 +181,7 @@ document.documentElement.dataset.theme = state.theme;
 makeControls(about, set);
 showControls();
 showSteps();
-curve.begin(set);
+curve.begin(set, about.validity);
 map.begin(about, set);
 function redraw() { forgetColours(); showFlows(); map.redraw(); }
 new ResizeObserver(redraw).observe(document.querySelector("main"));

@@ -3,12 +3,12 @@
 const listeners = [];
 const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
 const defaults = {
-  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", x: "slope", y: "roughness", shade: "most",
+  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", judge: "1", x: "slope", y: "roughness", shade: "most",
 };
 // What can be chosen from few; numbers and names of the chute are checked by the server, which says what is wrong.
 const parameters = ["slope", "e", "ew", "roughness"];
 const allowed = {
-  si: ["", "1"], whole: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
+  si: ["", "1"], whole: ["", "1"], judge: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
   shade: ["most", "families", "density", "interior"],
 };
 // What holds the state back from the address: a finger or button that is down, or changes within the last moments.
