@@ -8,6 +8,7 @@ from statistics import median
 from urllib.parse import parse_qs, urlsplit
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
@@ -669,8 +670,8 @@ def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
     opened(page)
     said = page.locator("#judged")
     expect(said).to_have_text(
-        "Stability of 9 flows of the curve: × unstable (3), ■ stable (3), ? not known (3). Between them nothing is known. "
-        "Each was held against at least the waves of 11 to 91 d."
+        "Stability of 9 flows of the curve: × unstable (3), ■ stable (3), ? not known (3). "
+        "Between them nothing is known. Each was held against at least the waves of 11 to 91 d."
     )
     assert len(set(asked)) == 9
     assert page.locator("#curve .verdict").count() == 9
@@ -686,3 +687,41 @@ def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
     page.unroute("**/ask/stability?*")
     page.locator("#surface").select_option("interface")
     expect(said).to_contain_text("Stability of 1 flows of the curve, 8 to come: × unstable (0)", timeout=20_000)
+
+
+def test_values_are_read_off_every_chart_by_mouse_and_by_keyboard(page):
+    opened(page)
+    answer = page.request.get("/ask/flows?slope=0.3&e=0.8&ew=0.8&roughness=0.6&Q=3").json()
+    page.locator("#profile-nu").hover(position={"x": 60, "y": 150})
+    tip = page.locator("#profile-nu .tip tspan").all_text_contents()
+    height = float(tip[0].removeprefix("z "))
+    for flow, said in zip(answer["flows"], tip[1:], strict=True):
+        expected = np.interp(height, flow["profile"]["z"], flow["profile"]["nu"])
+        assert float(said.removeprefix("ν ")) == pytest.approx(expected, rel=0.02, abs=1e-6)
+    # The same height is read in the other charts.
+    assert page.locator("#profile-u .tip tspan").first.text_content() == tip[0]
+    page.mouse.move(2, 2)
+    expect(page.locator(".tip")).to_have_count(0)
+    box = page.locator("#curve").bounding_box()
+    x, y = page.evaluate(
+        "(({ x, y }) => [x + 6, y + 6])(document.querySelectorAll('#curve .dot')[2].getBoundingClientRect())"
+    )
+    page.mouse.move(x, y)
+    expect(page.locator("#curve .tip")).to_contain_text(re.compile(r"Q (3\.0|2\.9)\d*, h 1\.7\d*density inverted"))
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.7 * box["height"])
+    expect(page.locator("#curve .tip")).to_have_count(0)
+    page.locator("#pause").focus()
+    page.keyboard.press("Tab")
+    expect(page.locator("#budget")).to_be_focused()
+    for key, said in (("Home", "z 0, work "), ("ArrowUp", "z 0.552, work "), ("PageDown", "z 0, work ")):
+        page.keyboard.press(key)
+        expect(page.locator("#spoken")).to_contain_text(said)
+        expect(page.locator("#budget .tip")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.locator(".tip")).to_have_count(0)
+    page.keyboard.press("Shift+Tab")
+    page.locator("#map-panel").scroll_into_view_if_needed()
+    page.locator("#map").hover(position={"x": 150, "y": 100})
+    expect(page.locator("#map .tip")).to_contain_text("flows at one flux: not known")
+    page.locator("#map").press("ArrowRight")
+    expect(page.locator("#spoken")).to_contain_text("roughness 0.6, flows at one flux: not known")

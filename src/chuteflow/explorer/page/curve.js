@@ -2,6 +2,7 @@
 import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
+import * as readout from "./readout.js";
 import { change, state } from "./state.js";
 import { factor, labelled, unit } from "./units.js";
 
@@ -158,14 +159,14 @@ export function redraw() {
     x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), lines, marks, hair: flux() * sq,
   });
   tellLimits();
+  if (svg.matches(":focus-visible") && held === null) readout.speak(readChosen());
   svg.setAttribute("aria-valuenow", String(fluxWithin(Number(state.Q) || 0) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
   svg.setAttribute("aria-valuemax", String(frame.x.high * sq));
 }
 
 /** The point of the curve that is nearest to the pointer: its flux and the quantity. */
-function nearest(event) {
-  const box = svg.getBoundingClientRect(), px = event.clientX - box.left, py = event.clientY - box.top;
+function nearest(px, py) {
   const name = state.against, sq = factor("Q"), sn = factor(name);
   let best = Infinity, found = null;
   for (const b of curve.branches) for (let i = 1; i < b.Q.length; i++) {
@@ -173,13 +174,27 @@ function nearest(event) {
     const along = ((px - x0) * (x1 - x0) + (py - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1);
     const w = Math.max(0, Math.min(1, along)), off = Math.hypot(px - x0 - w * (x1 - x0), py - y0 - w * (y1 - y0));
     const between = (list) => list[i - 1] ** (1 - w) * list[i] ** w;
-    if (off < best) { best = off; found = { Q: between(b.Q), value: between(b[name]) }; }
+    if (off < best) { best = off; found = { Q: between(b.Q), value: between(b[name]), off, kind: `density ${b.density[w < 0.5 ? i - 1 : i]}`, limits: words(b, w < 0.5 ? i - 1 : i) }; }
   }
   return found;
 }
 
+/** Show the numbers of a flow of the curve beside it; returns them in words. */
+function read({ Q, value, kind, limits: beyond }) {
+  const name = state.against, said = [["Q", Q], [name, value]].map(([symbol, v]) => `${symbol} ${number(v * factor(symbol))}${unit(symbol) ? ` ${unit(symbol)}` : ""}`);
+  const says = [said.join(", "), kind, beyond].filter(Boolean).map((text) => ({ text }));
+  readout.place(svg, shown, { x: shown.sx(Q * factor("Q")), y: shown.sy(value * factor(name)), says });
+  return says.map(({ text }) => text).join("; ");
+}
+
+/** The same of the chosen flow, which the keys move along the curve. */
+function readChosen() {
+  const flow = flows?.[chosen];
+  return flow && shown ? read({ Q: flow.Q, value: flow[state.against], kind: flow.kinds, limits: flow.validity.words.join(", ") }) : "";
+}
+
 function moveTo(event) {
-  const point = shown && nearest(event);
+  const box = svg.getBoundingClientRect(), point = shown && nearest(event.clientX - box.left, event.clientY - box.top);
   if (!point) return;
   held = Math.log(point.value);
   set({ Q: fluxWithin(point.Q) }, event);
@@ -205,9 +220,18 @@ for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () =
   if (flow !== null) change({ flow });
   held = null;
 });
-svg.addEventListener("keydown", (event) => {
-  const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
-  if (!turn) return;
-  event.preventDefault();
-  set({ Q: fluxWithin((Number(state.Q) || 0) * 1.01 ** turn) }, event);
+/** Pixels from the curve within which it is read. */
+const near = 30;
+readout.follow(svg, {
+  over: (x, y) => {
+    const point = shown && held === null ? nearest(x, y) : null;
+    if (point && point.off < near) read(point); else readout.clear(svg);
+  },
+  away: () => readout.clear(svg),
+  key: (name) => {
+    if (!name) { readout.speak(readChosen()); return true; }
+    const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[name];
+    if (turn) set({ Q: fluxWithin((Number(state.Q) || 0) * 1.01 ** turn) });
+    return Boolean(turn);
+  },
 });

@@ -1,7 +1,8 @@
 // The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair to drag.
 import { ask, AtRest } from "./ask.js";
-import { draw } from "./chart.js";
+import { draw, number } from "./chart.js";
 import { byId, colour, sentence } from "./page.js";
+import * as readout from "./readout.js";
 import { chute, state } from "./state.js";
 
 const svg = byId("map"), key = byId("map-key"), selects = { x: byId("map-x"), y: byId("map-y") };
@@ -243,10 +244,40 @@ function move(event) {
 svg.addEventListener("pointerdown", (event) => { holding = true; svg.setPointerCapture(event.pointerId); move(event); });
 svg.addEventListener("pointermove", (event) => { if (holding) move(event); });
 for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { holding = false; });
-svg.addEventListener("keydown", (event) => {
-  const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[event.key];
-  if (!turn) return;
-  event.preventDefault();
-  const name = state[turn[0]], { low, high } = about.controls[name], value = (Number(state[name]) || low) + (turn[1] * (high - low)) / 200;
-  set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) }, event);
+/** Whether a place is within a ring of points. */
+function within(ring, [x, y]) {
+  let inside = false;
+  ring.forEach(([x1, y1], i) => {
+    const [x0, y0] = ring.at(i - 1);
+    if (y1 > y !== y0 > y && x < x1 + ((y - y1) / (y0 - y1)) * (x0 - x1)) inside = !inside;
+  });
+  return inside;
+}
+
+/** Show what the map says at a place; returns it in words. */
+function read(x, y) {
+  const current = columns.length && wanted.x === state.x && wanted.y === state.y;
+  const found = current ? [...drawn.areas].find(([, rings]) => rings.some((ring) => within(ring, [x, y])))?.[0] ?? unknown : unknown;
+  const { name, label } = shadings[state.shade];
+  const says = [...[[state.x, x], [state.y, y]].map(([axis, value]) => `${about.controls[axis].label.toLowerCase()} ${number(value)}`), `${label}: ${found === unknown ? "not known" : name(found)}`];
+  readout.place(svg, shown, { x: shown.sx(x), y: shown.sy(y), says: says.map((text) => ({ text })) });
+  return says.join(", ");
+}
+const readHere = () => readout.speak(read(Number(state[state.x]), Number(state[state.y])));
+
+readout.follow(svg, {
+  over: (px, py) => {
+    const [x, y] = [shown.sx.inverse(px), shown.sy.inverse(py)], inside = [[state.x, x], [state.y, y]].every(([name, value]) => value >= about.controls[name].low && value <= about.controls[name].high);
+    if (inside && !holding) read(x, y); else readout.clear(svg);
+  },
+  away: () => readout.clear(svg),
+  key: (pressed) => {
+    if (!pressed) { readHere(); return true; }
+    const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[pressed];
+    if (!turn) return false;
+    const name = state[turn[0]], { low, high } = about.controls[name], value = (Number(state[name]) || low) + (turn[1] * (high - low)) / 200;
+    set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) });
+    readHere();
+    return true;
+  },
 });
