@@ -20,6 +20,9 @@ let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = nu
 let verdicts = new Map();
 // While the curve is dragged: ln of the quantity where the pointer is.
 let held = null;
+// Where the pointer reads the curve, in pixels, and how far from the curve it still does.
+let pointer = null;
+const near = 30;
 
 /** `setter` (parts, event) changes the state; `validity` has the words for what passes a limit, and what they mean. */
 export function begin(setter, validity) {
@@ -159,7 +162,8 @@ export function redraw() {
     x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), lines, marks, hair: flux() * sq,
   });
   tellLimits();
-  if (svg.matches(":focus-visible") && held === null) readout.speak(readChosen());
+  if (pointer) readPointer();
+  else if (svg.matches(":focus-visible")) readout.speak(readChosen());
   svg.setAttribute("aria-valuenow", String(fluxWithin(Number(state.Q) || 0) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
   svg.setAttribute("aria-valuemax", String(frame.x.high * sq));
@@ -185,6 +189,12 @@ function read({ Q, value, kind, limits: beyond }) {
   const says = [said.join(", "), kind, beyond].filter(Boolean).map((text) => ({ text }));
   readout.place(svg, shown, { x: shown.sx(Q * factor("Q")), y: shown.sy(value * factor(name)), says });
   return says.map(({ text }) => text).join("; ");
+}
+
+/** The same of the flow at the pointer, if the curve is near. */
+function readPointer() {
+  const point = pointer && shown && held === null ? nearest(...pointer) : null;
+  if (point && point.off < near) read(point); else readout.clear(svg);
 }
 
 /** The same of the chosen flow, which the keys move along the curve. */
@@ -220,14 +230,15 @@ for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () =
   if (flow !== null) change({ flow });
   held = null;
 });
-/** Pixels from the curve within which it is read. */
-const near = 30;
 readout.follow(svg, {
-  over: (x, y) => {
-    const point = shown && held === null ? nearest(x, y) : null;
-    if (point && point.off < near) read(point); else readout.clear(svg);
+  over: (...at) => {
+    pointer = at;
+    readPointer();
   },
-  away: () => readout.clear(svg),
+  away: () => {
+    pointer = null;
+    readout.clear(svg);
+  },
   key: (name) => {
     if (!name) { readout.speak(readChosen()); return true; }
     const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[name];

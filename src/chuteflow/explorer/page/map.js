@@ -23,7 +23,7 @@ const first = 8, finest = 64, finestUnknown = 16;
 const unknown = -1;
 // Places near which a column is looked at closely, at most.
 const mostNear = 32;
-let about = null, set = null, failure = "", shown = null, holding = false;
+let about = null, set = null, failure = "", shown = null, holding = false, pointer = null;
 // What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
 let wanted = {}, columns = [], whole = false, drawn = null;
 
@@ -229,6 +229,7 @@ export function redraw() {
   const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
   key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
+  if (pointer) readPointer();
   key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
   svg.classList.toggle("failed", Boolean(failure));
 }
@@ -263,14 +264,23 @@ function read(x, y) {
   readout.place(svg, shown, { x: shown.sx(x), y: shown.sy(y), says: says.map((text) => ({ text })) });
   return says.join(", ");
 }
+/** The same where the pointer is, if that is on the map. */
+function readPointer() {
+  const [x, y] = [shown.sx.inverse(pointer[0]), shown.sy.inverse(pointer[1])];
+  const inside = [[state.x, x], [state.y, y]].every(([name, value]) => value >= about.controls[name].low && value <= about.controls[name].high);
+  if (inside && !holding) read(x, y); else readout.clear(svg);
+}
 const readHere = () => readout.speak(read(Number(state[state.x]), Number(state[state.y])));
 
 readout.follow(svg, {
-  over: (px, py) => {
-    const [x, y] = [shown.sx.inverse(px), shown.sy.inverse(py)], inside = [[state.x, x], [state.y, y]].every(([name, value]) => value >= about.controls[name].low && value <= about.controls[name].high);
-    if (inside && !holding) read(x, y); else readout.clear(svg);
+  over: (...at) => {
+    pointer = at;
+    readPointer();
   },
-  away: () => readout.clear(svg),
+  away: () => {
+    pointer = null;
+    readout.clear(svg);
+  },
   key: (pressed) => {
     if (!pressed) { readHere(); return true; }
     const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[pressed];
