@@ -70,7 +70,7 @@ def test_straight_lines_between_the_points_of_a_profile_show_no_corner_that_is_n
         assert len(z) < 300
         between = np.linspace(0.0, min(z[-1], flow.interface_height), 2001)
         exact = flow.profile(between)
-        for symbol, name in answers._FIELDS.items():
+        for symbol, name in answers.FIELDS.items():
             field = getattr(exact, name)
             off = np.abs(np.interp(between, z, profile[symbol]) - field).max()
             assert off < 1e-3 * np.abs(field).max(), (symbol, off)

@@ -6,7 +6,6 @@ import json
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +16,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from chuteflow import __version__
 from chuteflow.errors import InputError
-from chuteflow.explorer import queries
+from chuteflow.explorer.about import about
 from chuteflow.explorer.answers import QUESTIONS, Answer, answer
 from chuteflow.explorer.scheduler import Scheduler
 from chuteflow.explorer.worker import Compute
-from chuteflow.steady.quantities import QUANTITIES
-from chuteflow.steady.validity import WORDS
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -155,24 +151,7 @@ async def _page(_: Request) -> Response:
 
 
 async def _about(_: Request) -> Response:
-    return JSONResponse(
-        {
-            "version": __version__,
-            "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
-            "presets": [asdict(preset) for preset in queries.PRESETS],
-            "cases": [asdict(case) for case in queries.cases()],
-            "validity": WORDS,
-            "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
-            "quantities": {
-                quantity.symbol: {
-                    "description": quantity.description,
-                    "unit": quantity.unit,
-                    "dimension": quantity.dimension,
-                }
-                for quantity in QUANTITIES.values()
-            },
-        }
-    )
+    return JSONResponse(about())
 
 
 def _response(given: Answer, told: bool) -> Response:

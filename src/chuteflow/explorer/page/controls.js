@@ -123,7 +123,7 @@ export function showControls() {
     byId(`${name}-unit`).textContent = units || "–";
     byId(`${name}-unit`).title = units ? "" : "dimensionless";
   }
-  byId("angle").value = fieldText(degrees(Number(state.slope)));
+  if (controls.slope) byId("angle").value = fieldText(degrees(Number(state.slope)));
   for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
   for (const name of ["si", "whole", "judge"]) byId(name).checked = Boolean(state[name]);

@@ -1,6 +1,7 @@
 // The curve of all flows, folds and all: flows at the flux as points to choose, and the curve itself to drag.
 import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
+import { kept } from "./kept.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
 import * as readout from "./readout.js";
 import { change, state } from "./state.js";
@@ -127,6 +128,7 @@ function judged(at) {
 }
 
 function sayJudged(all) {
+  if (kept) return "";
   if (!state.judge) return "Stability along the curve is not looked at.";
   const count = (kind) => all.filter((one) => one.state === kind).length, left = unjudged().length;
   const counts = `× unstable (${count("unstable")}), ■ stable (${count("stable")}), ? not known (${count("unknown")})`;

@@ -1,9 +1,10 @@
 // The page: the state changes, questions are asked, and the panels are redrawn when answers come.
-import { Latest } from "./ask.js";
+import { askAbout, Latest } from "./ask.js";
 import { number } from "./chart.js";
 import { makeControls, showControls } from "./controls.js";
 import * as curve from "./curve.js";
 import * as chutePicture from "./grains.js";
+import { kept } from "./kept.js";
 import * as map from "./map.js";
 import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
@@ -11,9 +12,9 @@ import * as stability from "./stability.js";
 import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, start, state, undo, write } from "./state.js";
 import { factor, setQuantities, unit } from "./units.js";
 
-const about = await (await fetch("about")).json();
+const about = await askAbout();
 setQuantities(about.quantities);
-start(about.presets[0].state);
+start(about.presets[0].state, about.fixed);
 byId("version").textContent = about.version;
 
 let flows = null, mark = 0;
@@ -85,7 +86,7 @@ onChange((has) => {
   if (has("Q", "against", "whole", "judge")) curve.redraw();
   if (has("against", "whole", "judge")) stability.again();
   if (has("flow") || ofLooks(has)) showFlows();
-  map.changed(has);
+  if (!kept) map.changed(has);
 });
 
 // --- flows --------------------------------------------------------------------------------------------------------
@@ -125,16 +126,22 @@ byId("flows").addEventListener("change", (event) => set({ flow: event.target.val
 
 // --- what can be taken along ------------------------------------------------------------------------------------
 
-/** Tables and pictures that the server makes: the link is of the state at the time of the click. */
+/** A link to what the server makes of the state at the time of the click. */
+function exported(link, what, format) {
+  const refresh = () => { link.href = `ask/export?${new URLSearchParams({ ...chute(), Q: state.Q, ...grains(), what, format })}`; };
+  link.addEventListener("click", refresh);
+  link.addEventListener("focus", refresh);
+}
+
+/** Tables and pictures that the server makes. */
 for (const [what, title] of [["profiles", "Profiles of all fields"], ["curve", "Curve of all flows"]]) {
   const item = document.createElement("li");
+  item.className = "served";
   item.append(`${title}: `);
   for (const format of ["csv", "svg", "png"]) {
     const link = Object.assign(document.createElement("a"), { textContent: format.toUpperCase(), download: "", href: "#" });
     link.dataset.export = `${what}-${format}`;
-    const refresh = () => { link.href = `ask/export?${new URLSearchParams({ ...chute(), Q: state.Q, ...grains(), what, format })}`; };
-    link.addEventListener("click", refresh);
-    link.addEventListener("focus", refresh);
+    exported(link, what, format);
     item.append(link, " ");
   }
   byId("exports").append(item);
@@ -148,6 +155,11 @@ for (const kind of ["svg", "png"]) {
   picture.append(button, " ");
 }
 byId("exports").append(picture);
+const whole = document.createElement("li");
+whole.className = "served";
+whole.innerHTML = 'This chute at every flux, as one page that needs no server: <a href="#" download data-export="page-html">HTML</a>';
+exported(whole.querySelector("a"), "page", "html");
+byId("exports").append(whole);
 
 for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEventListener("click", async () => {
   write();
@@ -182,8 +194,20 @@ makeControls(about, set);
 showControls();
 showSteps();
 curve.begin(set, about.validity);
-map.begin(about, set);
-function redraw() { forgetColours(); showFlows(); map.redraw(); }
+if (kept) tellKept(kept.says);
+else map.begin(about, set);
+/** What a page that needs no server is of: beside the flux, or folded away where there is no room. */
+function tellKept(says) {
+  const words = document.createElement("details");
+  words.open = innerWidth > 700;
+  words.innerHTML = `<summary>What this page is of</summary>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
+  byId("controls").append(words);
+}
+function redraw() {
+  forgetColours();
+  showFlows();
+  if (!kept) map.redraw();
+}
 new ResizeObserver(redraw).observe(document.querySelector("main"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 mark = performance.now();

@@ -2,6 +2,7 @@
 // and shown as answers come.
 import { ask, AtRest } from "./ask.js";
 import * as curve from "./curve.js";
+import { kept } from "./kept.js";
 import { byId, escaped } from "./page.js";
 import { chute, grains, state } from "./state.js";
 
@@ -39,12 +40,12 @@ export function stop() {
 export function restart(number) {
   verdicts = [];
   count = number;
-  looking = count > 0;
+  looking = count > 0 && !kept;
   again();
 }
 
 /** Go on with what is not known yet. */
-export function again() { asking.begin(); }
+export function again() { if (!kept) asking.begin(); }
 
 /** Put what is known beside the flows. */
 export function show() {

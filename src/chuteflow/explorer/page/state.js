@@ -13,11 +13,12 @@ const allowed = {
 };
 // What holds the state back from the address: a finger or button that is down, or changes within the last moments.
 const rest = 250;
-let first = {}, due = null, held = false, written = "", newest = 0, told = () => {};
+let first = {}, unchanged = [], due = null, held = false, written = "", newest = 0, told = () => {};
 export const state = {};
 
-/** Take the state of the address, over the defaults and over `preset`. */
-export function start(preset) {
+/** Take the state of the address, over the defaults and over `preset`, in which the `fixed` names stay. */
+export function start(preset, fixed = []) {
+  unchanged = fixed;
   first = { ...defaults, ...Object.fromEntries(Object.entries(preset).map(([name, value]) => [name, String(value)])) };
   Object.assign(state, fromAddress());
   written = address();
@@ -25,7 +26,7 @@ export function start(preset) {
 }
 
 function fromAddress() {
-  const given = new URLSearchParams(location.search), known = (name) => given.has(name) && (allowed[name]?.includes(given.get(name)) ?? true);
+  const given = new URLSearchParams(location.search), known = (name) => given.has(name) && !unchanged.includes(name) && (allowed[name]?.includes(given.get(name)) ?? true);
   const taken = Object.fromEntries(Object.entries(first).map(([name, value]) => [name, known(name) ? given.get(name) : value]));
   return taken.x === taken.y ? { ...taken, x: defaults.x, y: defaults.y } : taken;
 }
