@@ -725,3 +725,45 @@ def test_values_are_read_off_every_chart_by_mouse_and_by_keyboard(page):
     expect(page.locator("#map .tip")).to_contain_text("flows at one flux: not known")
     page.locator("#map").press("ArrowRight")
     expect(page.locator("#spoken")).to_contain_text("roughness 0.6, flows at one flux: not known")
+
+
+def test_pinned_flows_stay_drawn_until_they_are_removed(page):
+    opened(page)
+    page.locator("#pin").click()
+    page.locator("#flows input").nth(2).check()
+    page.locator("#pin").click()
+    table = page.locator("#pinned tbody tr")
+    expect(table).to_have_count(2)
+    expect(table.nth(0)).to_contain_text("38.8390.43927.339hot, dilute, deep")
+    expect(page.locator("#curve .pin")).to_have_count(2)
+    expect(page.locator("#profile-nu .line")).to_have_count(5)
+    before = page.locator("#curve .line").count()
+    page.locator("#slope").fill("0.31")
+    page.locator("#slope").press("Enter")
+    expect(page.locator("#says")).to_contain_text("One flow carries")
+    # The flows stay as they were, and so does the curve of their chute.
+    expect(table.nth(0)).to_contain_text("0.338.8390.43927.339hot, dilute, deep")
+    expect(page.locator("#profile-nu .line")).to_have_count(3)
+    expect(page.locator("#curve .line[stroke-width='1.5']")).to_have_count(2)
+    assert before > 0
+    # The chosen one is the only flow, though the third was chosen before.
+    page.locator("#pin").click()
+    expect(table.nth(2)).to_contain_text("cold, dense, shallow")
+    page.wait_for_url("**7C0.31**")
+    page.reload()
+    expect(table).to_have_count(3)
+    page.get_by_role("button", name="remove b").click()
+    expect(table).to_have_count(2)
+    page.get_by_role("button", name="show a").click()
+    expect(page.locator("#slope")).to_have_value("0.3")
+    expect(page.locator("#flows input").nth(0)).to_be_checked()
+    page.locator("#undo").click()
+    expect(table).to_have_count(3)
+
+
+def test_a_pin_that_cannot_be_is_told(page):
+    opened(page, "?pin=0.3~2~0.8~0.6~free~lun~3~0|0.3~0.8|" + "0.3~0.8~0.8~0.6~free~lun~3~7")
+    expect(page.locator("#pinned tbody tr").nth(0)).to_contain_text("restitution e = 2")
+    expect(page.locator("#pinned tbody tr").nth(1)).to_contain_text("left out")
+    expect(page.locator("#pinned tbody tr").nth(2)).to_contain_text("there is no such flow")
+    expect(page.locator("#profile-nu .line")).to_have_count(3)

@@ -72,6 +72,7 @@ const shapes = {
   unstable: (x, y) => `<path class="verdict unstable" d="M${x - 4} ${y - 4}l8 8m-8 0l8-8">`,
   stable: (x, y) => `<path class="verdict stable" d="M${x - 4} ${y - 4}h8v8h-8z">`,
   unknown: (x, y) => `<text class="verdict unknown" x="${x}" y="${y + 4}" text-anchor="middle">?`,
+  pin: (x, y, { letter }) => `<g class="pin"><path d="M${x - 5} ${y - 5}h10v10h-10z"/><text x="${x - 8}" y="${y - 7}">${letter}</text>`,
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
 };
 

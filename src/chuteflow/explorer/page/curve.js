@@ -3,6 +3,7 @@ import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
 import { kept } from "./kept.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
+import { pinned } from "./pins.js";
 import * as readout from "./readout.js";
 import { change, state } from "./state.js";
 import { factor, labelled, unit } from "./units.js";
@@ -48,14 +49,15 @@ export function takeFlows(list, k) {
 
 /** Part of the curve that holds its folds and the flux, or all of it. */
 function wanted() {
-  const Q = flux(), name = state.against;
+  const Q = flux(), name = state.against, s = factor("Q"), sn = factor(name), pins = pinned();
+  const near = pins.map(({ flow, chute }) => (flow.Q * factor("Q", chute.slope)) / s), beside = pins.map(({ flow, chute }) => (flow[name] * factor(name, chute.slope)) / sn);
   const all = curve.branches.flatMap((b) => b.Q.map((q, i) => [q, b[name][i]]));
   if (!all.length) return null;
   const folds = curve.branches.flatMap((b) => b.special.filter((s) => s.kind === "fold-Q").map((s) => s.Q));
-  const ends = state.whole ? all.map(([q]) => q) : [...folds.map((q) => q / 2.5), ...folds.map((q) => q * 2.5), ...(Q > 0 ? [Q / 2, Q * 2] : [])];
+  const ends = state.whole ? all.map(([q]) => q) : [...folds.map((q) => q / 2.5), ...folds.map((q) => q * 2.5), ...(Q > 0 ? [Q / 2, Q * 2] : []), ...near.flatMap((q) => [q / 1.3, q * 1.3])];
   if (!ends.length) ends.push(...all.map(([q]) => q));
   const x = { low: Math.min(...ends), high: Math.max(...ends), log: true };
-  const inside = all.filter(([q]) => q >= x.low && q <= x.high), ys = (inside.length ? inside : all).map((p) => p[1]);
+  const inside = all.filter(([q]) => q >= x.low && q <= x.high), ys = [...(inside.length ? inside : all).map((p) => p[1]), ...beside];
   return { x, y: { low: Math.min(...ys) * 0.9, high: Math.max(...ys) * 1.1, log: true }, name, whole: state.whole };
 }
 
@@ -153,6 +155,11 @@ export function redraw() {
   const name = state.against, sq = factor("Q"), sn = factor(name), lines = [], marks = [];
   const at = (branch, i) => ({ x: branch.Q[i] * sq, y: branch[name][i] * sn });
   const axis = ({ low, high, log }, s, label) => ({ low: low * s, high: high * s, log, label });
+  for (const { flow, chute, curve: other, letter, dash, colour: ink } of pinned()) {
+    const [q, n] = [factor("Q", chute.slope), factor(name, chute.slope)];
+    for (const branch of other?.branches ?? []) lines.push({ points: branch.Q.map((value, i) => [value * q, branch[name][i] * n]), colour: ink, dash, width: 1.5 });
+    marks.push({ x: flow.Q * q, y: flow[name] * n, shape: "pin", letter, title: `pinned: ${flow.name}` });
+  }
   for (const branch of curve.branches) {
     lines.push(...linesOf(branch, (i) => [branch.Q[i] * sq, branch[name][i] * sn]));
     for (const s of branch.special) marks.push({ x: s.Q * sq, y: s[name] * sn, shape: shapes[s.kind] ?? "circle", title: curve.kinds[s.kind] ?? s.kind });

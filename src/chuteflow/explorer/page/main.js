@@ -7,6 +7,7 @@ import * as chutePicture from "./grains.js";
 import { kept } from "./kept.js";
 import * as map from "./map.js";
 import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
+import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
 import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, start, state, undo, write } from "./state.js";
@@ -85,6 +86,7 @@ onChange((has) => {
   showControls();
   if (has("Q", "against", "whole", "judge")) curve.redraw();
   if (has("against", "whole", "judge")) stability.again();
+  if (has("pin")) pins.load();
   if (has("flow") || ofLooks(has)) showFlows();
   if (!kept) map.changed(has);
 });
@@ -107,7 +109,8 @@ function showFlows() {
   byId("flows").innerHTML = list.map(row).join("");
   if (focused) byId("flows").querySelector("input:checked")?.focus();
   stability.show();
-  drawProfiles(list, flows.top, k);
+  pins.show();
+  drawProfiles(list, flows.top, k, pins.pinned());
   curve.takeFlows(list, k);
   // The rest comes a frame later, so that flows and profiles follow the slider as closely as they can.
   requestAnimationFrame(() => setTimeout(showRest));
@@ -194,6 +197,10 @@ makeControls(about, set);
 showControls();
 showSteps();
 curve.begin(set, about.validity);
+pins.begin(set, () => {
+  showFlows();
+  curve.redraw();
+}, chosen);
 if (kept) tellKept(kept.says);
 else map.begin(about, set);
 /** What a page that needs no server is of: beside the flux, or folded away where there is no room. */

@@ -67,26 +67,31 @@ function readable(id) {
 
 for (const id of ["profile-nu", "profile-T", "profile-u", "budget"]) readable(id);
 
-export function drawProfiles(list, top, chosen) {
-  const sz = factor("z");
+/** Profiles of the flows at the flux, and of those that are pinned. */
+export function drawProfiles(list, height, chosen, pins) {
+  const sz = factor("z"), pinned = pins.map((pin) => ({ ...pin, ratio: (symbol) => factor(symbol, pin.chute.slope) / factor(symbol) }));
+  const top = Math.max(list.length ? height : 0, ...pinned.map(({ flow, ratio }) => Math.min(2.5 * flow.h, flow.profile.z.at(-1)) * ratio("z")));
   for (const [symbol, words, letter] of panels) {
     const svg = byId(`profile-${symbol}`);
-    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows: the arrow keys read values`);
+    svg.setAttribute("aria-label", `${words} against height for ${list.length} flows and ${pinned.length} pinned: the arrow keys read values`);
     charts.delete(svg.id);
-    if (!list.length) { svg.innerHTML = ""; continue; }
+    if (!list.length && !pinned.length) { svg.innerHTML = ""; continue; }
     const s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
     const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
-    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol])) * s;
+    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol]), ...pinned.flatMap(({ flow, ratio }) => flow.profile[symbol].map((v) => v * ratio(symbol)))) * s;
     const shown = draw(svg, {
       x: { low: 0, high: largest * 1.05, label },
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
-      lines: list.flatMap((flow, i) => {
+      lines: [...pinned.map(({ flow, ratio, dash, colour: ink }) => ({
+        points: flow.profile.z.map((z, n) => [flow.profile[symbol][n] * ratio(symbol) * s, z * ratio("z") * sz]), colour: ink, dash,
+      })), ...list.flatMap((flow, i) => {
         const points = flow.profile.z.map((z, n) => [flow.profile[symbol][n] * s, z * sz]);
         const band = flow.validity.words.length ? [{ points, colour: colour("--beyond"), width: 9, beneath: true }] : [];
         return [...band, { points, colour: flowColour(i), width: i === chosen ? 3.4 : 2 }];
-      }),
+      })],
     });
     const lines = list.map((flow, i) => ({ z: flow.profile.z, values: flow.profile[symbol], colour: flowColour(i), label: letter, factor: s }));
+    lines.push(...pinned.map(({ flow, ratio, letter: pin, colour: ink }) => ({ z: flow.profile.z.map((z) => z * ratio("z")), values: flow.profile[symbol], colour: ink, label: `${pin}: ${letter}`, factor: s * ratio(symbol) })));
     charts.set(svg.id, { shown, top, lines });
   }
   if (height !== null) read();
