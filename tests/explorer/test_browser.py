@@ -758,6 +758,8 @@ def test_pinned_flows_stay_drawn_until_they_are_removed(page):
     expect(page.locator("#slope")).to_have_value("0.3")
     expect(page.locator("#flows input").nth(0)).to_be_checked()
     page.locator("#undo").click()
+    expect(page.locator("#slope")).to_have_value("0.31")
+    page.locator("#undo").click()
     expect(table).to_have_count(3)
 
 

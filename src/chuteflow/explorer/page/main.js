@@ -10,7 +10,7 @@ import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page
 import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
-import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, start, state, undo, write } from "./state.js";
+import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, settle, start, state, undo, write } from "./state.js";
 import { factor, setQuantities, unit } from "./units.js";
 
 const about = await askAbout();
@@ -21,10 +21,13 @@ byId("version").textContent = about.version;
 let flows = null, mark = 0;
 const chosen = () => Math.max(0, Math.min(Number(state.flow) || 0, (flows?.flows.length ?? 1) - 1));
 
-/** Change the state because of `event`, whose time the redraw is measured from. */
+/** Change the state because of `event`, whose time the redraw is measured from. What is done with one click is a step of its own. */
 function set(parts, event) {
+  const alone = event?.type === "change" || event?.type === "click";
   mark = event?.timeStamp ?? performance.now();
+  if (alone) settle();
   change(parts);
+  if (alone) settle();
 }
 
 // --- answers ----------------------------------------------------------------------------------------------------

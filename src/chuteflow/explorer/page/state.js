@@ -85,9 +85,12 @@ export function onSteps(listen) { told = listen; }
 export const canUndo = () => due !== null || place() > 0;
 export const canRedo = () => due === null && place() < newest;
 
+/** What waits to be written becomes a step now. */
+export function settle() { if (due !== null) write(); }
+
 /** Take back the last step. */
 export function undo() {
-  if (due !== null) write();
+  settle();
   if (canUndo()) history.back();
 }
 
