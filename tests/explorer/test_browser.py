@@ -769,3 +769,31 @@ def test_a_pin_that_cannot_be_is_told(page):
     expect(page.locator("#pinned tbody tr").nth(1)).to_contain_text("left out")
     expect(page.locator("#pinned tbody tr").nth(2)).to_contain_text("there is no such flow")
     expect(page.locator("#profile-nu .line")).to_have_count(3)
+
+
+def test_what_was_measured_is_drawn_behind_the_flows(page):
+    profile = {"z": [0.5, 1.5, 2.5], "value": [0.4, 0.3, 0.2], "error": [0.02, 0.02, 0.02]}
+    numbers = {"Q": {"value": 4.0, "error": 0.1}, "h": {"value": 3.0, "error": None}}
+    given = {"slope": 0.31, "e": 0.8}
+    run = {"name": "<own> run", "what": "particle run", "profiles": {"nu": profile}, "numbers": numbers, "given": given}
+    other = {"name": "other", "what": "measurements", "profiles": {}, "numbers": {"Q": numbers["Q"]}, "given": {}}
+    about = page.request.get("/about").json() | {"data": [run, other]}
+    page.route("**/about", lambda route: route.fulfill(json=about))
+    opened(page)
+    expect(page.locator("#data li")).to_have_count(2)
+    expect(page.locator("#data li").nth(0)).to_contain_text("<own> run particle run; slope 0.31, e 0.8")
+    expect(page.locator("#profile-nu .measured")).to_have_count(3)
+    expect(page.locator("#profile-T .measured")).to_have_count(0)
+    expect(page.locator("#curve .measured")).to_have_count(1)
+    # Behind the lines: what comes first is painted first.
+    order = (
+        "[...document.querySelectorAll('#profile-nu .measured, #profile-nu .line')].map((e) => e.getAttribute('class'))"
+    )
+    assert page.evaluate(order) == ["measured"] * 3 + ["line"] * 3
+    page.locator("#against").select_option("M")
+    expect(page.locator("#curve .measured")).to_have_count(0)
+    page.get_by_role("button", name="show the chute of <own> run").click()
+    expect(page.locator("#slope")).to_have_value("0.31")
+    expect(page.locator("#Q")).to_have_value("4")
+    page.locator("#data input").nth(0).uncheck()
+    expect(page.locator("#profile-nu .measured")).to_have_count(0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -11,10 +12,11 @@ from chuteflow.steady.quantities import QUANTITIES
 from chuteflow.steady.validity import WORDS
 
 
-def about() -> dict[str, Any]:
-    """Controls, cases, words and quantities, as JSON has them."""
+def about(data: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """Controls, cases, words and quantities, as JSON has them, with ``data``, what was measured."""
     return {
         "version": __version__,
+        "data": list(data),
         "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
         "presets": [asdict(preset) for preset in queries.PRESETS],
         "cases": [asdict(case) for case in queries.cases()],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,8 +82,13 @@ def host_of(header: str) -> str:
     return (name if colon and port.isdigit() else header).strip("[]").lower()
 
 
-def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer) -> Starlette:
-    """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``."""
+def application(
+    hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer, data: Sequence[Mapping[str, Any]] = ()
+) -> Starlette:
+    """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``.
+
+    The page draws ``data``, what was measured, behind the flows.
+    """
     scheduler = Scheduler(compute)
 
     @asynccontextmanager
@@ -104,10 +109,13 @@ def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answe
 
         return respond
 
+    async def told(_: Request) -> Response:
+        return JSONResponse(about(data))
+
     served = Starlette(
         routes=[
             Route("/", _page),
-            Route("/about", _about),
+            Route("/about", told),
             *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
@@ -148,10 +156,6 @@ def bound(host: str, port: int | None) -> socket.socket:
 
 async def _page(_: Request) -> Response:
     return FileResponse(PAGE / "index.html")
-
-
-async def _about(_: Request) -> Response:
-    return JSONResponse(about())
 
 
 def _response(given: Answer, told: bool) -> Response:

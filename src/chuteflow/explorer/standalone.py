@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -41,8 +42,10 @@ def standalone(
     *,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
+    data: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """The page of ``chute`` as HTML, at first at ``flux``; in SI units where there are ``scales``.
+    """The page of ``chute`` as HTML, at first at ``flux``; in SI units where there are ``scales``. It draws ``data``,
+    what was measured, behind the flows.
 
     It has every branch in the range of surface temperatures and hold-ups, and says how far what it interpolates
     is off at flows solved between.
@@ -53,7 +56,7 @@ def standalone(
     """
     for points in _POINTS:
         found = sampled(chute, points, surface_temperature, largest_holdup)
-        page = _html(_kept(found, flux, scales))
+        page = _html(_kept(found, flux, scales, data))
         if len(page.encode()) <= _LARGEST:
             return page
     raise SolveError("the curve has too many branches for one page: narrow the range that is searched")
@@ -62,10 +65,10 @@ def standalone(
 # --- what is kept in the page -----------------------------------------------------------------------------------------
 
 
-def _kept(found: SampledCurve, flux: float, scales: Scales | None) -> dict[str, Any]:
+def _kept(found: SampledCurve, flux: float, scales: Scales | None, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     chute = found.curve.chute
     return {
-        "about": _about(found.curve, flux, scales),
+        "about": _about(found.curve, flux, scales) | {"data": list(data)},
         "chute": contract.chute_object(chute),
         "curve": curve_content(found.curve, scales),
         "branches": [_branch(one) for one in found.branches],

@@ -30,6 +30,13 @@ _EPILOG = (
 @options.chute_options
 @options.option("--flux", "--mass-flux", metavar="AMOUNT", help="Mass flux Q per unit width; 3 by default.")
 @options.option("--export", metavar="FILE", help="Write one page that needs no server to FILE: .html.")
+@click.option(
+    "--data",
+    metavar="FILE",
+    multiple=True,
+    help="Measurements as `chuteflow fit` reads them, or a particle run of `chuteflow dem read`, to draw behind the "
+    "flows; as often as there are files.",
+)
 @options.search_range_options
 @click.option("--port", type=click.IntRange(0, 65535), help="Port; 8765 or another free one by default, 0 for any.")
 @options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, this machine alone, by default.")
@@ -38,7 +45,8 @@ _EPILOG = (
 def command(**given: Any) -> None:
     """Write a page, or serve one until interrupted."""
     if given["export"] is None:
-        _serve(given, _address_query(given))
+        query = _address_query(given)
+        _serve(given, query, _data(given))
     else:
         _export(given)
 
@@ -58,10 +66,20 @@ def _export(given: dict[str, Any]) -> None:
     require_writable(path, (".html",))
     flux = _flux(given, chute.slope, scales)
     within = options.search(given, chute.slope, scales)
+    data = _data(given, chute.slope)
     from chuteflow.explorer.standalone import standalone
 
-    write_whole(path, standalone(chute, flux, scales, **within))
+    write_whole(path, standalone(chute, flux, scales, data=data, **within))
     click.echo(f"{path}: one page of this chute, with every flow in the range searched; it needs no server")
+
+
+def _data(given: dict[str, Any], slope: float | None = None) -> list[dict[str, Any]]:
+    """What was measured, from the files of the options."""
+    if not given["data"]:
+        return []
+    from chuteflow.explorer.data import read_data
+
+    return read_data(given["data"], slope=given["slope"] if slope is None else slope, scales=_scales(given))
 
 
 def _scales(given: dict[str, Any]) -> Scales | None:
@@ -133,7 +151,7 @@ def _material(given: Mapping[str, Any]) -> dict[str, Any]:
     return values | {name: str(getattr(whole, name)) for name in options.words(given) if name != "base"}
 
 
-def _serve(given: Mapping[str, Any], query: str) -> None:
+def _serve(given: Mapping[str, Any], query: str, data: list[dict[str, Any]]) -> None:
     import uvicorn
 
     from chuteflow.explorer.connections import Connection, Server
@@ -153,7 +171,7 @@ def _serve(given: Mapping[str, Any], query: str) -> None:
         click.echo(
             "Its first answers come in a few seconds, or in about half a minute where the search is compiled first"
         )
-    served = application(hosts)
+    served = application(hosts, data=data)
     settings = uvicorn.Config(
         served, http=Connection, ws="none", log_level="error", lifespan="on", timeout_graceful_shutdown=1
     )

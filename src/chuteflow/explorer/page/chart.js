@@ -76,6 +76,13 @@ const shapes = {
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
 };
 
+/** Marks of what was measured. */
+const measuredShapes = {
+  circle: (x, y) => `<circle cx="${x}" cy="${y}" r="3"/>`,
+  diamond: (x, y) => `<path d="M${x} ${y - 4}l4 4l-4 4l-4-4z"/>`,
+  triangle: (x, y) => `<path d="M${x - 3.5} ${y - 3}h7l-3.5 6z"/>`,
+};
+
 function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
   const out = [];
   for (const v of ticks(x, Math.max(2, (r - l) / 62))) {
@@ -97,9 +104,9 @@ function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
  * Draw into `svg`, without what has no place; returns the scales `sx`, `sy` and the frame `box`.
  *
  * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}, hatched without a
- * colour. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
+ * colour. `points`: {x, y, across, up (errors), shape, colour, title}, beneath all lines. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
-export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = [], hair }) {
+export function draw(svg, { x: across, y: up, areas = [], points: measured = [], lines = [], marks = [], hair }) {
   const x = sound(across), y = sound(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
@@ -111,6 +118,10 @@ export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = []
   for (const { rings, colour } of areas) {
     const paint = colour ? `fill="${colour}" stroke="${colour}"` : `class="unknown" fill="url(#${svg.id}-hatch)"`;
     inside.push(`<path d="${rings.map((points) => `${path(points, sx, sy)}z`).join("")}" ${paint} stroke-width=".7"/>`);
+  }
+  for (const point of measured.filter((one) => known([sx(one.x), sy(one.y)]))) {
+    const [px, py, l, r, t, b] = [sx(point.x), sy(point.y), sx(point.x - (point.across ?? 0)), sx(point.x + (point.across ?? 0)), sy(point.y + (point.up ?? 0)), sy(point.y - (point.up ?? 0))].map((v) => (Number.isFinite(v) ? v.toFixed(1) : "0"));
+    inside.push(`<g class="measured" stroke="${point.colour}"><path d="M${l} ${py}H${r}M${px} ${t}V${b}"/>${measuredShapes[point.shape](Number(px), Number(py))}<title>${escaped(point.title)}</title></g>`);
   }
   for (const { points, colour, dash, width: thick = 2, beneath } of lines) {
     inside.push(`<path class="${beneath ? "beneath" : "line"}" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);

@@ -3,6 +3,7 @@ import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
 import { kept } from "./kept.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
+import { curvePoints } from "./measured.js";
 import { pinned } from "./pins.js";
 import * as readout from "./readout.js";
 import { change, state } from "./state.js";
@@ -51,6 +52,7 @@ export function takeFlows(list, k) {
 function wanted() {
   const Q = flux(), name = state.against, s = factor("Q"), sn = factor(name), pins = pinned();
   const near = pins.map(({ flow, chute }) => (flow.Q * factor("Q", chute.slope)) / s), beside = pins.map(({ flow, chute }) => (flow[name] * factor(name, chute.slope)) / sn);
+  for (const { x, y } of curvePoints(name)) { near.push(x / s); beside.push(y / sn); }
   const all = curve.branches.flatMap((b) => b.Q.map((q, i) => [q, b[name][i]]));
   if (!all.length) return null;
   const folds = curve.branches.flatMap((b) => b.special.filter((s) => s.kind === "fold-Q").map((s) => s.Q));
@@ -168,7 +170,7 @@ export function redraw() {
   marks.push(...judged(at));
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
   shown = draw(svg, {
-    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), lines, marks, hair: flux() * sq,
+    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), points: curvePoints(name), lines, marks, hair: flux() * sq,
   });
   tellLimits();
   if (pointer) readPointer();

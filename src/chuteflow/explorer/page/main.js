@@ -7,6 +7,7 @@ import * as chutePicture from "./grains.js";
 import { kept } from "./kept.js";
 import * as map from "./map.js";
 import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
+import * as measurements from "./measured.js";
 import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
@@ -200,6 +201,10 @@ makeControls(about, set);
 showControls();
 showSteps();
 curve.begin(set, about.validity);
+measurements.begin(about.data, set, () => {
+  showFlows();
+  curve.redraw();
+});
 pins.begin(set, () => {
   showFlows();
   curve.redraw();

@@ -1,5 +1,6 @@
 // Profiles of all flows over height, and the budget of fluctuation energy of the chosen one.
 import { draw, number } from "./chart.js";
+import { profilePoints } from "./measured.js";
 import { byId, colour, flowColour, sizeOf } from "./page.js";
 import * as readout from "./readout.js";
 import { factor, labelled, unit } from "./units.js";
@@ -70,18 +71,20 @@ for (const id of ["profile-nu", "profile-T", "profile-u", "budget"]) readable(id
 /** Profiles of the flows at the flux, and of those that are pinned. */
 export function drawProfiles(list, height, chosen, pins) {
   const sz = factor("z"), pinned = pins.map((pin) => ({ ...pin, ratio: (symbol) => factor(symbol, pin.chute.slope) / factor(symbol) }));
-  const top = Math.max(list.length ? height : 0, ...pinned.map(({ flow, ratio }) => Math.min(2.5 * flow.h, flow.profile.z.at(-1)) * ratio("z")));
+  const top = Math.max(list.length ? height : 0, ...pinned.map(({ flow, ratio }) => Math.min(2.5 * flow.h, flow.profile.z.at(-1)) * ratio("z")), ...(list.length || pinned.length ? [] : profilePoints("nu").map(({ y }) => y / sz)));
   for (const [symbol, words, letter] of panels) {
     const svg = byId(`profile-${symbol}`);
     svg.setAttribute("aria-label", `${words} against height for ${list.length} flows and ${pinned.length} pinned: the arrow keys read values`);
     charts.delete(svg.id);
-    if (!list.length && !pinned.length) { svg.innerHTML = ""; continue; }
+    const points = profilePoints(symbol).filter(({ y }) => y <= top * sz);
+    if (!list.length && !pinned.length && !points.length) { svg.innerHTML = ""; continue; }
     const s = factor(symbol), { width } = sizeOf(svg), bare = symbol !== "nu" && width < narrow;
     const label = labelled(width < narrow && unit(symbol) ? letter : `${words} ${letter}`, symbol);
-    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol]), ...pinned.flatMap(({ flow, ratio }) => flow.profile[symbol].map((v) => v * ratio(symbol)))) * s;
+    const largest = Math.max(...list.flatMap((flow) => flow.profile[symbol]), ...pinned.flatMap(({ flow, ratio }) => flow.profile[symbol].map((v) => v * ratio(symbol))), ...points.map(({ x }) => x / s)) * s;
     const shown = draw(svg, {
       x: { low: 0, high: largest * 1.05, label },
       y: { low: 0, high: top * sz, label: bare ? "" : labelled("height z", "z"), bare },
+      points,
       lines: [...pinned.map(({ flow, ratio, dash, colour: ink }) => ({
         points: flow.profile.z.map((z, n) => [flow.profile[symbol][n] * ratio(symbol) * s, z * ratio("z") * sz]), colour: ink, dash,
       })), ...list.flatMap((flow, i) => {
