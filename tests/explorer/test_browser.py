@@ -797,3 +797,95 @@ def test_what_was_measured_is_drawn_behind_the_flows(page):
     expect(page.locator("#Q")).to_have_value("4")
     page.locator("#data input").nth(0).uncheck()
     expect(page.locator("#profile-nu .measured")).to_have_count(0)
+
+
+def test_the_map_follows_the_sliders_coarsely_and_is_fine_when_they_rest(page):
+    def column(route):
+        query = parse_qs(urlsplit(route.request.url).query)
+        part = {"stops": [0.6 + 0.2 * place_of(route) ** 2], "values": [1, 2]}
+        parts = dict.fromkeys(("most", "families", "interior", "density"), part)
+        if "coarse" not in query:
+            parts["hot"] = part
+            if hold:
+                held.append(route)
+                return
+        asked.append((query["e"][0], "coarse" in query))
+        at = 0.05 + 0.65 * place_of(route)
+        route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
+
+    asked, held, hold = [], [], False
+    page.unroute("**/ask/map?*")
+    page.route("**/ask/map?*", column)
+    opened(page)
+    key = page.locator("#map-key")
+    expect(key).to_contain_text("Drag the cross-hair to another chute.")
+    expect(key).not_to_contain_text("Drawing")
+    assert ("0.8", True) not in asked
+    page.locator("#map").scroll_into_view_if_needed()
+    page.wait_for_timeout(100)
+    hold = True
+    page.locator("#e-slider").press("ArrowRight")
+    expect(key).to_contain_text("Coarse, until the sliders rest.")
+    assert asked.count(("0.8005", True)) == 9 or asked.count(("0.801", True)) == 9
+    hold = False
+    for route in held:
+        column(route)
+    expect(key).not_to_contain_text("Coarse")
+    # The line between columns is a smooth curve: its corners, of a parabola here, turn by little.
+    turns = page.evaluate(
+        """() => {
+        const text = document.querySelectorAll('#map g > path[fill]')[1].getAttribute('d');
+        const points = text.match(/[\\d.]+ [\\d.]+/g).map((pair) => pair.split(' ').map(Number));
+        const line = points.slice(0, points.length / 2);
+        const angles = line.slice(1).map(([x, y], i) => Math.atan2(y - line[i][1], x - line[i][0]));
+        return angles.slice(1).map((angle, i) => Math.abs(angle - angles[i]));
+    }"""
+    )
+    assert len(turns) > 60
+    assert sorted(turns)[-3] < 0.12
+
+
+def test_the_three_flows_are_told_step_by_step(page):
+    opened(page, "?slope=0.31&roughness=0.61")
+    page.locator("#story-begin").click()
+    for number, count, chosen in ((1, 3, 0), (2, 3, 0), (3, 3, 1), (4, 3, 2), (5, 1, 0), (6, 1, 0)):
+        expect(page.locator("#story-place")).to_have_text(f"step {number} of 6")
+        expect(page.locator("#flows label")).to_have_count(count)
+        expect(page.locator("#flows input").nth(chosen)).to_be_checked()
+        page.locator("#story-next").click()
+    # What is said of the steps holds: which flow is left, and how they are ordered.
+    expect(page.locator("#flows label")).to_contain_text("cold, dense, shallow")
+    page.locator("#story-back").click()
+    expect(page.locator("#flows label")).to_contain_text("hot, dilute, deep")
+    page.locator("#story-back").click()
+    expect(page.locator("#flows label").nth(2)).to_contain_text("density inverted")
+    page.locator("#undo").click()
+    expect(page.locator("#story-place")).to_have_text("step 5 of 6")
+    page.locator("#story-end").click()
+    expect(page.locator("#story")).to_be_hidden()
+
+
+def test_a_small_curve_stays_in_view(page):
+    opened(page)
+    expect(page.locator("#mini")).to_be_hidden()
+    page.locator("#take-panel").scroll_into_view_if_needed()
+    expect(page.locator("#mini .dot")).to_have_count(3)
+    page.locator("#Q").fill("6")
+    page.locator("#Q").press("Enter")
+    expect(page.locator("#mini .dot")).to_have_count(1)
+    page.locator("h1").scroll_into_view_if_needed()
+    expect(page.locator("#mini")).to_be_hidden()
+
+
+def test_the_sliders_fold_away_on_a_phone(page):
+    page.set_viewport_size({"width": 390, "height": 800})
+    opened(page)
+    expect(page.locator("#slope-slider")).to_be_hidden()
+    expect(page.locator("#folded")).to_have_text("tan θ 0.3, e 0.8, e_w 0.8, r 0.6, Q 3")
+    page.locator("#take-panel").scroll_into_view_if_needed()
+    expect(page.locator("#mini")).to_be_in_viewport()
+    page.locator("#fold summary").click()
+    expect(page.locator("#slope-slider")).to_be_in_viewport()
+    expect(page.locator("#mini")).to_be_in_viewport()
+    page.set_viewport_size({"width": 1280, "height": 800})
+    expect(page.locator("#slope-slider")).to_be_visible()

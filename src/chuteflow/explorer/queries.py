@@ -193,7 +193,8 @@ class ColumnAsked:
     """A column of the map: the chute, the two parameters across and up, the place (share of the outer axis), and
     values of the inner parameter (``near``) at which the classes of the columns beside it change.
 
-    The chute has the axes' own parameters at the low ends of their ranges.
+    A ``coarse`` column is one to look at while sliders move. The chute has the axes' own parameters at the low ends of
+    their ranges.
     """
 
     chute: Chute
@@ -201,6 +202,7 @@ class ColumnAsked:
     y: str
     place: float
     near: tuple[float, ...]
+    coarse: bool = False
 
 
 #: Values near which the classes of a column are looked at closely, at most.
@@ -222,9 +224,11 @@ def map_column(query: Query) -> ColumnAsked:
     if x == y:
         raise InputError(f"x and y are both {x}: give two parameters")
     held = dict(query) | {name: str(CONTROLS[name].low) for name in (x, y)}
-    chute, other = read(held, other=("x", "y", "place"), optional=("near",))
+    chute, other = read(held, other=("x", "y", "place"), optional=("near", "coarse"))
     near = [text for text in other.get("near", "").split(",") if text]
     if len(near) > MOST_NEAR:
         raise InputError(f"near has {len(near)} values: give at most {MOST_NEAR}")
     values = tuple(number_in("near", text, -1.0, 2.0) for text in near)
-    return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values)
+    if other.get("coarse", "1") != "1":
+        raise InputError(f"coarse = {other['coarse'][:40]!r}: must be 1, or left away")
+    return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values, "coarse" in other)

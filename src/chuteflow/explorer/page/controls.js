@@ -26,6 +26,7 @@ export function makeControls(about, setter) {
   for (const [name, control] of Object.entries(about.controls)) makeSlider(name, control);
   choices = about.choices;
   for (const [name, choice] of Object.entries(choices)) makeChoice(name, choice);
+  foldWhereSmall();
   byId("controls").addEventListener("submit", (event) => event.preventDefault());
   makeCases(about);
   takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
@@ -63,11 +64,18 @@ function showCase() {
   byId("case-words").textContent = found?.words ?? "";
 }
 
+/** On a phone the sliders fold away; elsewhere there is room for them. */
+function foldWhereSmall() {
+  const small = matchMedia("(max-width: 700px)"), fold = () => { byId("fold").open = !small.matches; };
+  small.addEventListener("change", fold);
+  fold();
+}
+
 function addControl(markup) {
   const box = document.createElement("div");
   box.className = "control";
   box.innerHTML = markup;
-  byId("controls").append(box);
+  byId("sliders").append(box);
   return box;
 }
 
@@ -123,6 +131,7 @@ export function showControls() {
     byId(`${name}-unit`).textContent = units || "–";
     byId(`${name}-unit`).title = units ? "" : "dimensionless";
   }
+  byId("folded").textContent = Object.entries(controls).map(([name, { symbol: letter }]) => `${letter} ${byId(name).value}`).join(", ");
   if (controls.slope) byId("angle").value = fieldText(degrees(Number(state.slope)));
   for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];

@@ -27,6 +27,15 @@ let held = null;
 let pointer = null;
 const near = 30;
 
+// A small curve stays in view beside the sliders where the curve itself is out of it.
+const mini = byId("mini");
+let away = false;
+new IntersectionObserver((entries) => {
+  away = entries.at(-1).intersectionRatio < 0.4;
+  mini.toggleAttribute("hidden", !away);
+  if (away) redraw();
+}, { threshold: 0.4 }).observe(svg);
+
 /** `setter` (parts, event) changes the state; `validity` has the words for what passes a limit, and what they mean. */
 export function begin(setter, validity) {
   set = setter;
@@ -169,9 +178,9 @@ export function redraw() {
   }
   marks.push(...judged(at));
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
-  shown = draw(svg, {
-    x: axis(frame.x, sq, labelled("mass flux Q", "Q")), y: axis(frame.y, sn, labelled(nameOf(name), name)), points: curvePoints(name), lines, marks, hair: flux() * sq,
-  });
+  const x = axis(frame.x, sq, labelled("mass flux Q", "Q")), y = axis(frame.y, sn, labelled(nameOf(name), name));
+  shown = draw(svg, { x, y, points: curvePoints(name), lines, marks, hair: flux() * sq });
+  if (away) draw(mini, { x: { ...x, label: "" }, y: { ...y, label: name }, lines, marks: marks.filter(({ shape }) => shape === "dot"), hair: flux() * sq });
   tellLimits();
   if (pointer) readPointer();
   else if (svg.matches(":focus-visible")) readout.speak(readChosen());

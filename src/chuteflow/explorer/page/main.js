@@ -11,6 +11,7 @@ import * as measurements from "./measured.js";
 import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
+import * as story from "./story.js";
 import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, settle, start, state, undo, write } from "./state.js";
 import { factor, setQuantities, unit } from "./units.js";
 
@@ -91,6 +92,7 @@ onChange((has) => {
   if (has("Q", "against", "whole", "judge")) curve.redraw();
   if (has("against", "whole", "judge")) stability.again();
   if (has("pin")) pins.load();
+  if (has("story")) story.show();
   if (has("flow") || ofLooks(has)) showFlows();
   if (!kept) map.changed(has);
 });
@@ -209,6 +211,7 @@ pins.begin(set, () => {
   showFlows();
   curve.redraw();
 }, chosen);
+story.begin(set);
 if (kept) tellKept(kept.says);
 else map.begin(about, set);
 /** What a page that needs no server is of: beside the flux, or folded away where there is no room. */
@@ -216,7 +219,7 @@ function tellKept(says) {
   const words = document.createElement("details");
   words.open = innerWidth > 700;
   words.innerHTML = `<summary>What this page is of</summary>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
-  byId("controls").append(words);
+  byId("sliders").append(words);
 }
 function redraw() {
   forgetColours();

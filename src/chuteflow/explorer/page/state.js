@@ -3,7 +3,7 @@
 const listeners = [];
 export const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
 const defaults = {
-  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", judge: "1", pin: "", x: "slope", y: "roughness", shade: "most",
+  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", judge: "1", pin: "", story: "", x: "slope", y: "roughness", shade: "most",
 };
 // What can be chosen from few; numbers and names of the chute are checked by the server, which says what is wrong.
 const parameters = ["slope", "e", "ew", "roughness"];
