@@ -841,7 +841,7 @@ def test_the_map_follows_the_sliders_coarsely_and_is_fine_when_they_rest(page):
         return angles.slice(1).map((angle, i) => Math.abs(angle - angles[i]));
     }"""
     )
-    assert len(turns) > 60
+    assert len(turns) > 40
     assert sorted(turns)[-3] < 0.12
 
 
@@ -852,7 +852,8 @@ def test_the_three_flows_are_told_step_by_step(page):
         expect(page.locator("#story-place")).to_have_text(f"step {number} of 6")
         expect(page.locator("#flows label")).to_have_count(count)
         expect(page.locator("#flows input").nth(chosen)).to_be_checked()
-        page.locator("#story-next").click()
+        if number < 6:
+            page.locator("#story-next").click()
     # What is said of the steps holds: which flow is left, and how they are ordered.
     expect(page.locator("#flows label")).to_contain_text("cold, dense, shallow")
     page.locator("#story-back").click()

@@ -14,7 +14,7 @@ from chuteflow.steady.chute import Chute
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
 #: where every point has trajectories of its own, finer for what is known in closed form.
 _FIRST, _FIRST_HOT = 9, 33
-#: The same of a coarse column, which has no hot flows.
+#: The same of a coarse column, which takes hot flows from the same search.
 _FIRST_COARSE, _TOLERANCE_COARSE = 5, 0.06
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 
