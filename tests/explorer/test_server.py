@@ -22,7 +22,7 @@ from starlette.testclient import TestClient
 import chuteflow
 from chuteflow.cli.program import main
 from chuteflow.errors import InputError
-from chuteflow.explorer import answers, domains, growth, queries, sentences
+from chuteflow.explorer import answers, contents, domains, growth, queries, sentences
 from chuteflow.explorer.server import PAGE, application, bound, host_of
 from chuteflow.stability.modes import Disturbances
 from chuteflow.steady.chute import SURFACES
@@ -446,3 +446,27 @@ def test_a_coarse_column_is_like_the_fine_one_but_rougher():
     assert coarse["tolerance"] > 3 * fine["tolerance"]
     assert coarse["parts"]["most"]["values"][0] == fine["parts"]["most"]["values"][0]
     assert answers.answer("map", query | {"coarse": "yes"}).status == 400
+
+
+@pytest.mark.parametrize(
+    "chute",
+    [
+        chuteflow.Chute(0.3, 0.8, 0.8, 0.6),
+        chuteflow.Chute(0.28, 0.8, 0.8, 0.6),
+        chuteflow.Chute(0.31, 0.8, 0.8, 0.6, surface="interface"),
+    ],
+)
+def test_kinds_of_density_between_onsets_are_those_of_the_flows(chute):
+    for branch in chuteflow.curve(chute, points=40, tolerance=1e-6).branches:
+        assert contents.densities(branch) == [flow.density for flow in branch.flows]
+
+
+def test_limits_passed_along_the_curve(client):
+    curve = client.get("/ask/curve", params=PAPER).json()
+    words = client.get("/ask/limits", params=PAPER).json()["words"]
+    assert [len(one) for one in words] == [len(branch["Q"]) for branch in curve["branches"]]
+    flows = client.get("/ask/flows", params=PAPER | {"Q": "3"}).json()["flows"]
+    (branch,) = curve["branches"]
+    for flow in flows:
+        nearest = int(np.abs(np.log(np.array(branch["h"]) / flow["h"])).argmin())
+        assert words[0][nearest] == flow["validity"]["words"]

@@ -17,7 +17,7 @@ from chuteflow.branches.enumeration import flows
 from chuteflow.branches.results import Curve
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
-from chuteflow.explorer.contents import curve_content, short
+from chuteflow.explorer.contents import curve_content, limits_passed, short
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
@@ -68,6 +68,7 @@ def problem(status: int, what: str) -> Answer:
 _LEFT_OUT = {
     "flows": "the flows at this flux are left out",
     "curve": "the curve of all flows is left out",
+    "limits": "where the curve passes limits of the theory is left out",
     "map": "this column of the map is left out",
     "export": "this file is left out",
     "stability": "the stability of this flow is left out",
@@ -115,9 +116,8 @@ def _flows(query: Query) -> Answer:
 
 def _place(flow: Flow) -> dict[str, Any]:
     """Where a flow is on the curve, how well that is known, and how far the flow keeps to the theory."""
-    told = contract.flow_object(flow)
-    names = (*(NUMBERS[name].symbol for name in contract.PLACE), "error", "validity")
-    return {name: told[name] for name in names}
+    numbers = {NUMBERS[name].symbol: contract.finite(getattr(flow, name)) for name in contract.PLACE}
+    return numbers | {"error": contract.finite(flow.error), "validity": contract.validity_object(flow)}
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
@@ -134,6 +134,11 @@ def _curve(query: Query) -> Answer:
     scales = queries.scales(other)
     found = _drawn(chute)
     return _json(curve_content(found, scales))
+
+
+def _limits(query: Query) -> Answer:
+    chute, _ = queries.read(query)
+    return _json({"words": [limits_passed(branch) for branch in _drawn(chute).branches]})
 
 
 @lru_cache(maxsize=4)
@@ -201,6 +206,7 @@ def _export(query: Query) -> Answer:
 QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "flows": _flows,
     "curve": _curve,
+    "limits": _limits,
     "map": _map,
     "stability": _stability,
     "export": _export,

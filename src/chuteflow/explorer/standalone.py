@@ -15,7 +15,7 @@ from chuteflow.branches.results import Curve
 from chuteflow.errors import SolveError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.about import about
-from chuteflow.explorer.contents import curve_content, short
+from chuteflow.explorer.contents import curve_content, limits_passed, short
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, Deviation, SampledBranch, SampledCurve, budget, sampled
 from chuteflow.io import contract, words
@@ -71,6 +71,7 @@ def _kept(found: SampledCurve, flux: float, scales: Scales | None, data: Sequenc
         "about": _about(found.curve, flux, scales) | {"data": list(data)},
         "chute": contract.chute_object(chute),
         "curve": curve_content(found.curve, scales),
+        "limits": {"words": [limits_passed(branch) for branch in found.curve.branches]},
         "branches": [_branch(one) for one in found.branches],
         "recipes": recipes(chute, FLUX_PLACE, scales),
         "says": list(_told(found, scales)),

@@ -21,6 +21,8 @@ const judgedOfBranch = 9;
 let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null, limits = {};
 // What is known about the stability of flows of the curve, by branch and place on it.
 let verdicts = new Map();
+// Which limits of the theory the flows of each branch pass, or null where that is not known.
+let passed = null;
 // While the curve is dragged: ln of the quantity where the pointer is.
 let held = null;
 // Where the pointer reads the curve, in pixels, and how far from the curve it still does.
@@ -47,8 +49,17 @@ export function takeCurve(answer) {
   curve = answer.error ? { branches: [], says: "", why: answer.error } : answer;
   byId("count").textContent = curve.says;
   verdicts = new Map();
+  passed = null;
   redraw();
 }
+
+/** The limits of the theory that the flows of the curve pass, in words. */
+export function takeLimits(words) {
+  passed = words;
+  redraw();
+}
+
+const wordsAt = (branch, i) => passed?.[curve.branches.indexOf(branch)][i];
 
 /** The flows at the flux and which of them is chosen; while the curve is dragged, the one at the pointer is. */
 export function takeFlows(list, k) {
@@ -95,19 +106,19 @@ function* stretches(branch, kind) {
 
 /** Lines of a branch: by the kind of density, over a band where the flows are beyond the theory. */
 function linesOf(branch, at) {
-  const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(branch.validity.words[i]?.length);
+  const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(wordsAt(branch, i)?.length);
   const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true }));
   const dash = ([i]) => (branch.density[i] === "monotonic" ? "7 4" : "");
   return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends) }))];
 }
 
 /** Where the words on a branch change: the first point of each stretch but the first. */
-const changes = (branch) => [...stretches(branch, (i) => branch.validity.words[i]?.join())].slice(1).map(([i]) => i + 1);
-const words = (branch, i) => branch.validity.words[i]?.join(", ") || "within the theory";
+const changes = (branch) => [...stretches(branch, (i) => wordsAt(branch, i)?.join())].slice(1).map(([i]) => i + 1);
+const words = (branch, i) => (passed ? wordsAt(branch, i).join(", ") || "within the theory" : "");
 
 /** What the shades mean: the words of the stretches that are drawn. */
 function tellLimits() {
-  const seen = new Set(curve.branches.flatMap((b) => b.validity.words.filter((_, i) => inFrame(b, i)).flat()));
+  const seen = new Set(curve.branches.flatMap((b, k) => (passed?.[k] ?? []).filter((_, i) => inFrame(b, i)).flat()));
   byId("beyond").textContent = seen.size ? `Shaded: beyond what the theory takes for granted, which changes at a bar: ${[...seen].map((word) => `${word} (${limits[word]})`).join("; ")}.` : "";
 }
 

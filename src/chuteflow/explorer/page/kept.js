@@ -44,7 +44,7 @@ function flowAt(b, position) {
   const field = ({ unit: units, rows }) => heights.map((_, n) => between((i) => units[i] * rows[i][n], at));
   return {
     ...Object.fromEntries(places.map((symbol) => [symbol, logarithm(curve[symbol], at)])),
-    name: names[nearest], kinds: kinds[nearest], validity: { words: curve.validity.words[nearest] }, error: kept.error,
+    name: names[nearest], kinds: kinds[nearest], validity: { words: kept.limits.words[b][nearest] }, error: kept.error,
     profile: { z: heights.map((share) => share * highest), ...Object.fromEntries(Object.entries(fields).map(([symbol, rows]) => [symbol, field(rows)])) },
     budget: Object.fromEntries(Object.entries(budget).map(([name, list]) => [name, between((i) => list[i], at)])),
   };
@@ -63,4 +63,4 @@ function flowsAt(Q) {
 }
 
 /** The answer to a question of the page. */
-export const answered = (question, { Q }) => (question === "curve" ? kept.curve : question === "flows" ? flowsAt(Number(Q)) : { error: "this page has no server to ask" });
+export const answered = (question, { Q }) => (question === "flows" ? flowsAt(Number(Q)) : kept[question] ?? { error: "this page has no server to ask" });

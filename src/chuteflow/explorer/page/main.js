@@ -1,5 +1,5 @@
 // The page: the state changes, questions are asked, and the panels are redrawn when answers come.
-import { askAbout, Latest } from "./ask.js";
+import { ask, askAbout, AtRest, Latest } from "./ask.js";
 import { number } from "./chart.js";
 import { makeControls, showControls } from "./controls.js";
 import * as curve from "./curve.js";
@@ -37,6 +37,13 @@ function set(parts, event) {
 /** Whether a panel waits for an answer, said after a while. */
 const waits = (panel) => (waiting) => byId(panel).setAttribute("aria-busy", String(waiting));
 
+/** Where the curve passes limits of the theory takes longer than the curve itself: it is asked when the sliders rest. */
+const limits = new AtRest(150, async (signal) => {
+  const answer = await ask("limits", chute(), signal);
+  signal.throwIfAborted();
+  if (!answer.error) curve.takeLimits(answer.words);
+});
+
 const asks = {
   flows: new Latest("flows", waits("words"), (answer, query, since) => take(answer, "flows", since, () => {
     flows = answer.error ? { ...answer, top: 1, says: sentence(answer.error) } : answer;
@@ -47,6 +54,7 @@ const asks = {
   })),
   curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => {
     curve.takeCurve(answer);
+    if (!answer.error) limits.begin();
     stability.again();
   })),
 };
@@ -78,7 +86,10 @@ function askFlows() {
   stability.stop();
   asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
 }
-const askCurve = () => asks.curve.ask({ ...chute(), ...grains() }, mark);
+function askCurve() {
+  limits.stop();
+  asks.curve.ask({ ...chute(), ...grains() }, mark);
+}
 
 onChange((has) => {
   if (has("theme")) {
