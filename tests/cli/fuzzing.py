@@ -57,7 +57,8 @@ COMMANDS = {
     "figures": {"--only": ("99", "0", "2,,3", "-1"), "--out": FILES, "--format": NAMES, "--method": NAMES},
     "report": {"--only": ("99", "x"), "--method": NAMES, "--no-claims": None},
     "sweep": {"--out": FILES, "--workers": ("0", "-1"), "--chunks": RANGES, "--dry-run": None, "--status": None},
-    "explore": {"--port": ("-1", "99999", "x"), "--host": ("", "no such host", "\x00")},
+    "explore": MATERIAL | LAW | SCALES | {"--flux": NUMBERS, "--export": FILES, "--search-temperature": RANGES}
+    | {"--port": ("-1", "99999", "x"), "--host": ("", "no such host", "\x00")},
 }  # fmt: skip
 #: Commands that take seconds where their input is good: they are given something bad, most of the time.
 SLOW = [name for name in COMMANDS if name not in ("solve", "curve", "hot")]

@@ -14,6 +14,8 @@ from chuteflow.steady.chute import Chute
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
 #: where every point has trajectories of its own, finer for what is known in closed form.
 _FIRST, _FIRST_HOT = 9, 33
+#: The same of a coarse column, which takes hot flows from the same search.
+_FIRST_COARSE, _TOLERANCE_COARSE = 5, 0.06
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 
 
@@ -42,11 +44,12 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     x, y, place = asked.x, asked.y, asked.place
     plane = _plane(asked.chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
-    tolerance = _TOLERANCE[BY_KEY[inner].of_base]
-    found = column(place, partial(summary, plane), [*_evenly(_FIRST), *_beside(plane, asked, tolerance)], tolerance)
+    tolerance = _TOLERANCE_COARSE if asked.coarse else _TOLERANCE[BY_KEY[inner].of_base]
+    first = _FIRST_COARSE if asked.coarse else _FIRST
+    found = column(place, partial(summary, plane), [*_evenly(first), *_beside(plane, asked, tolerance)], tolerance)
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
-    if plane.chute.surface == "free":
+    if plane.chute.surface == "free" and not asked.coarse:
         hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
         parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(
