@@ -149,7 +149,7 @@ BY_KEY: dict[str, Parameter] = {parameter.key: parameter for parameter in PARAME
 #: What else a chute has, each a name out of a list.
 NAMES = ("surface", "closure")
 
-#: Range searched unless another is asked for.
+#: Range searched by default.
 SURFACE_TEMPERATURE = (1e-3, 1e5)
 LARGEST_HOLDUP = 30.0
 #: What can be searched at all.

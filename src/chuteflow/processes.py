@@ -27,7 +27,7 @@ R = TypeVar("R")
 
 # The environment is that of all threads.
 _environment = RLock()
-#: The exit code of a worker that was about to run the script of its parent once more.
+#: The exit code of a worker that was about to run the script of its parent again.
 _RUNS_SCRIPT = 76
 #: Seconds that a dead process takes to be known as dead.
 _MOMENT = 0.5

@@ -34,7 +34,7 @@ from chuteflow.threads import on_one_thread
 
 #: What can be followed.
 KINDS = starting_points.KINDS
-#: Values of the parameter at which boundaries are entered, unless another number is asked for.
+#: Values of the parameter at which boundaries are entered, by default.
 SAMPLES = 13
 #: A value at which branches cannot be distinguished is moved by so many spacings, in turn.
 _ASIDE = (0.0, 0.07, -0.11)
@@ -110,7 +110,7 @@ class BoundarySet(Result, Sequence[Boundary]):
     branches could not be distinguished. ``reason`` says why there is none.
 
     Complete is this: every boundary is found that passes a sampled value on a branch in the range searched, and
-    is followed from end to end. One that begins and ends between two sampled values is looked for from both,
+    is followed from end to end. One that begins and ends between two sampled values is searched for from both,
     where flows come nearest to it; it could be missed if neither shows a sign of it, as where a whole branch
     of flows exists between them alone.
     """
@@ -231,7 +231,7 @@ def boundary(
             if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", fraction)
                 line = traced(point, within, tolerance, control, notice)
-                # A point that could not be distinguished from those of a known line has led to it once more.
+                # A point that could not be distinguished from those of a known line has led to it again.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]
 

@@ -30,7 +30,7 @@ from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
 from chuteflow.steady.model import LOSS, WORK
 
-#: Degree of the grid on which the largest of a field is looked for, if it is finer than the solution's.
+#: Degree of the grid on which the largest of a field is searched for, if it is finer than the solution's.
 _SAMPLES = 96
 #: Borders are renewed where the null vectors, of length 1 along them, are longer.
 _TURNED = 1.5

@@ -35,11 +35,11 @@ FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
 KINDS = (*FOLDS, "density-inversion", "interior-change")
 #: The row that holds the parameter.
 HELD = np.array([0.0, 0.0, 1.0])
-#: A point is looked for this far beyond a chord, and found within so many of its lengths beside it.
+#: A point is searched for this far beyond a chord, and found within so many of its lengths beside it.
 _BEYOND, _BESIDE = 0.02, 1.0
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
-#: A boundary beside the branches is looked for as far as so many times the distance to go to it.
+#: A boundary beside the branches is searched for as far as so many times the distance to go to it.
 _FARTHER = 1.5
 #: A step towards it covers at most this fraction of the distance at once, so many times, with flows solved to this
 #: tolerance, and ends where so small a fraction is left.
@@ -48,7 +48,7 @@ _STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 _CLOSE = 1e-14
 #: Net loss below this is none.
 _NONE = 1e-10
-#: Range of ln x over which the least is looked for, samples of it, and how often it is zoomed in.
+#: Range of ln x over which the least is searched for, samples of it, and how often it is zoomed in.
 _LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
 
 

@@ -55,7 +55,7 @@ class SecondParameter:
         return replace(self.chute, **{self.name: min(max(value, self.low), self.high)})
 
     def allows(self, value: float) -> bool:
-        """Whether the equations are asked for: within the range, or a little beyond it."""
+        """Whether the equations are requested: within the range, or a little beyond it."""
         margin = min(0.1 * (self.high - self.low), 0.5 * self.low if self.low > 0.0 else np.inf)
         return self.low - margin <= value <= self.high + margin
 

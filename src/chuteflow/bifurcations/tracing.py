@@ -29,7 +29,7 @@ CONTROL = ContinuationSettings(
 _CLOSE, _ALONG = 0.05, 0.9
 #: Below this fraction of the quantity in the null vector, the branch itself is singular.
 _SINGULAR = 1e-5
-#: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
+#: A point is searched for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
 _BESIDE, _SAME = 0.3, 1e-6
 #: To tell whether points are the same they are solved to this; where even that fails, what lies within this part of a

@@ -132,7 +132,7 @@ def _changes(chute: Chute, branch: TracedBranch, tolerance: float) -> Iterator[t
         values = rough[:, column].copy()
         for i in np.flatnonzero(np.abs(values) < _UNSURE).tolist():
             values[i] = quantity(Flow(chute, points[i].solution))
-        # The slopes are rough: what comes as near to zero as half of its way there is looked at.
+        # The slopes are rough: what comes as near to zero as half of its way there is examined.
         ways = {
             d.step: d
             for d in dips(values, at)

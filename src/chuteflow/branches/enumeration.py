@@ -91,7 +91,7 @@ def flows(
         T_surface: granular temperature far above (half-line) or at the interface.
         tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
         surface_temperature: range searched. It is extended where a branch of flows leads out of it towards
-            the value asked for; the range that was searched in the end is part of the result.
+            the requested value; the range that was searched in the end is part of the result.
         largest_holdup: range searched, extended in the same way.
 
     Raises:
@@ -239,7 +239,7 @@ def _wider(found: _BranchSearch, which: int, value: float) -> SearchRange:
 
 
 def _distinct(solutions: list[Solution], which: int) -> list[Solution]:
-    """Without repetitions, hot to cold, then by hold-up; surface temperatures that were asked for are one."""
+    """Without repetitions, hot to cold, then by hold-up; surface temperatures that were requested are one."""
     kept: list[Solution] = []
     for s in solutions:
         if all(np.abs(s.macroscopic - k.macroscopic).max() > _SAME + s.error + k.error for k in kept):

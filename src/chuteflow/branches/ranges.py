@@ -15,7 +15,7 @@ from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
-#: How far a search goes beyond a hold-up and a flux asked for, so that turns near them are seen from both sides.
+#: How far a search goes beyond a hold-up and a requested flux, so that turns near them are seen from both sides.
 _DEEPER, _FURTHER = 1.5, 3.0
 
 
@@ -93,7 +93,7 @@ class SearchRange:
         return replace(self, largest_flux=_FURTHER * value) if which == LOG_Q else self
 
     def contains(self, macroscopic: Array, margin: float = _ROUNDING) -> bool:
-        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, give or take ``margin``."""
+        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, within ``margin``."""
         return bool(
             np.log(self.coldest) - margin <= macroscopic[LOG_T] <= np.log(self.hottest) + margin
             and macroscopic[LOG_M] <= np.log(self.deepest) + margin

@@ -29,7 +29,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Searched:
-    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` looked at, where they
+    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` examined, where they
     were counted."""
 
     surface_temperature: tuple[float, float]
@@ -43,7 +43,7 @@ class FlowSet(Result, Sequence[Flow]):
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
     ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where there
-    may be more: where a branch leaves the range searched towards what was asked for, a flow that was seen could not be
+    may be more: where a branch leaves the range searched towards what was requested, a flow that was seen could not be
     solved, or the search leaves it open; None otherwise.
     """
 

@@ -29,14 +29,14 @@ _OTHERS = (0, 1, 2, 4, 8, 16)
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
 #: The same at larger hold-ups: there flows wind, and one between two others is a start only where these are near.
 _DEEP, _SPACING_DEEP = 5.0, 0.12
-#: Reaches over which the direction of a rough branch is looked for.
+#: Reaches over which the direction of a rough branch is searched for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
 #: there is not known.
 _SHARP = 0.8
 #: A solved flow lies within this of the rough one, and this fraction of the spacing.
 _ROUGH, _ASTRAY = 0.03, 0.3
-#: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
+#: Where a rough quantity comes as near to the requested value, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
 #: So near where the rough quantity turns, since a fold is not known as well; it turns where it is nearest to the value
@@ -46,9 +46,9 @@ _NEAR_TURN, _AROUND, _RISE = 0.08, 0.15, 0.01
 #: zero all along, its signs are not known well enough to join them.
 _SHORT, _BESIDE = 0.15, 0.15
 #: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
-#: least the second; and there by more than so many times of what the rough flow was wrong by.
+#: least the second; and there by more than this many times what the rough flow was wrong by.
 _STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
-#: Where the flows among rough ones are not found, they are looked for between rough ones so much further away.
+#: Where the flows among rough ones are not found, they are searched for between rough ones so much further away.
 _FURTHER = 0.1
 #: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
 #: where it changes by more than the second along the branch, per length.
@@ -258,7 +258,7 @@ def search(model: Model, within: SearchRange) -> TrajectoryGrid:
 
 
 def searched(within: SearchRange, grid: TrajectoryGrid) -> Searched:
-    """The range searched, and the cells that the search looked at."""
+    """The range searched, and the cells that the search examined."""
     cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
     return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
 
@@ -470,7 +470,7 @@ def _level(along: list[PathPoint], off: Array) -> list[tuple[int, int]]:
 
 
 def _at_fold(near: Solution) -> Solution:
-    """A flow at a fold in the quantity asked for: there the others are known to the root of the error."""
+    """A flow at a fold in the requested quantity: there the others are known to the root of the error."""
     return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 

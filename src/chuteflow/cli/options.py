@@ -442,7 +442,7 @@ def closure_names(given: Sequence[str]) -> list[str]:
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:
-    """The scales of the options, or None where dimensionless results are asked for: those of the chute's file or case
+    """The scales of the options, or None where dimensionless results are requested: those of the chute's file or case
     with --si, or where one of them is given.
 
     Raises:
@@ -567,7 +567,7 @@ def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None 
 def nearest(
     given: Mapping[str, Any], chute: Chute, condition: Mapping[str, float], scales: Scales | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """The nearest that has a flow in the range asked for where ``chute`` has none: what JSON has of it, and lines."""
+    """The nearest that has a flow in the requested range where ``chute`` has none: what JSON has of it, and lines."""
     from chuteflow.branches.nearest import nearest as look
     from chuteflow.io import contract, words
 

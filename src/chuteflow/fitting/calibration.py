@@ -37,7 +37,7 @@ _ROUGHLY, _CLOSELY = 1e-3, 1e-8
 _LENIENT, _TIGHT, _FLAT = 0.01, 0.002, 0.15
 #: First fits that are this many times worse than the best are given up.
 _HOPELESS = 30.0
-#: Confidence of intervals unless another is asked for.
+#: Confidence of intervals by default.
 CONFIDENCE = 0.95
 #: Trial chutes at most.
 _MOST_TRIALS = 100_000
@@ -274,7 +274,7 @@ def fit(
         base_height: whether the height of the base is unknown, in each experiment.
         loss: "linear" for least squares, or one that outliers count for less in: soft_l1, huber, cauchy.
         confidence: of the intervals.
-        ranges: between which values parameters are looked for first, by name.
+        ranges: between which values parameters are searched for first, by name.
         trials: how many trial chutes the search starts from.
 
     Raises:

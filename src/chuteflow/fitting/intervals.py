@@ -54,7 +54,7 @@ class Interval:
 
 
 class BetterFit(Exception):
-    """A better fit than the one whose intervals were asked for."""
+    """A better fit than the one whose intervals were requested."""
 
     def __init__(self, found: Minimum) -> None:
         super().__init__()

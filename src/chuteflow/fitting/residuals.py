@@ -35,9 +35,9 @@ _TOLERANCE, _ROUGH = 1e-9, 1e-6
 _HALVINGS = 4
 #: A flow is taken for the one before where it has moved by no more than this beyond twice what was expected.
 _STRAYED = 0.1
-#: Hold-ups at which flows are looked for where no measurement tells one.
+#: Hold-ups at which flows are searched for where no measurement tells one.
 _HOLDUPS = (0.3, 0.6, 1.2, 2.5, 5.0)
-#: A base is looked for within this many diameters of where the heights put it.
+#: A base is searched for within this many diameters of where the heights put it.
 MOST_OFFSET = 3.0
 
 
@@ -115,7 +115,7 @@ class TrialChute:
 
     @cached_property
     def _asked(self) -> list[dict[str, float]]:
-        """What flows are looked for by: an exact number, else a measured one, else hold-ups."""
+        """What flows are searched for by: an exact number, else a measured one, else hold-ups."""
         experiment = self.experiment
         if experiment.exact:
             return [dict(experiment.exact)]

@@ -120,7 +120,7 @@ def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: f
     for stop in sorted(stop for parts in each for stop in _expected(place, places, parts)):
         # Numbers that change together are expected to do so at nearly the same stop.
         if stop - last > 0.5 * tolerance:
-            # A little more than the tolerance apart would be halved once more.
+            # A little more than the tolerance apart would be halved again.
             fractions += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
             last = stop
     return fractions

@@ -31,7 +31,7 @@ from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
-#: Fractions of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
+#: Fractions of an axis to which boundaries are located, by default; the finest and coarsest allowed.
 TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
@@ -126,7 +126,7 @@ class Domain(Result):
 
     @cached_property
     def exists_at(self) -> NDArray[np.bool_]:
-        """Whether there is a flow at each temperature asked for, (T, n, m)."""
+        """Whether there is a flow at each requested temperature, (T, n, m)."""
         first = len(CODES)
         layers = [self._on_grid(self.columns, first + i) > 0 for i in range(len(self.plane.temperatures))]
         return np.array(layers, dtype=bool).reshape(len(layers), len(self.y), len(self.x))
@@ -144,7 +144,7 @@ class Domain(Result):
 
     @property
     def searched(self) -> Searched:
-        """The range in which flows were looked for."""
+        """The range in which flows were searched for."""
         within = self.plane.within
         return Searched((within.coldest, within.hottest), within.deepest)
 
@@ -186,7 +186,7 @@ def domain(
         x, y: the axes, any two of the four parameters: their name in :class:`chuteflow.Chute`, lowest and highest
             value, such as ``("slope", 0.1, 0.5)``.
         size: cells along x and y.
-        temperatures: surface temperatures at which flows are looked for too.
+        temperatures: surface temperatures at which flows are searched for too.
         tolerance: fraction of an axis to which boundaries are located, from 1e-6 to 0.1.
         surface_temperature: range searched.
         largest_holdup: range searched.
@@ -242,7 +242,7 @@ def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, pro
         columns.sort(key=lambda one: one.place)
         wanted = to_halve(columns, tolerance, tolerance)
         if len(columns) == first:
-            # All that is narrower than the first columns are apart is looked for once more.
+            # All that is narrower than the first columns are apart is searched for again.
             wanted = [(i, 0.5 * (left.place + right.place)) for i, (left, right) in enumerate(pairwise(columns))]
         tasks = [
             _Task(plane, place, shares_for(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, tolerance), tolerance)

@@ -30,7 +30,7 @@ _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 class FlowClasses:
     """The flows of one chute in the range searched.
 
-    ``at`` is whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
+    ``at`` is whether there is one at each requested temperature; ``most`` is the largest number at one flux, and
     ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty;
     ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
     INTERIORS and DENSITIES that are present.

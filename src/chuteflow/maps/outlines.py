@@ -154,7 +154,7 @@ def _parts(columns: Sequence[Column], number: int) -> tuple[list[float], list[Pi
     return [one.place for one in columns], [one.parts[number] for one in columns]
 
 
-#: How far around a point classes are looked at: beyond the tolerance of the columns there.
+#: How far around a point classes are examined: beyond the tolerance of the columns there.
 _ASIDE = 2e-3
 
 

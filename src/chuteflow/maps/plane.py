@@ -79,7 +79,7 @@ class ParameterPlane:
     """Two axes, and the values of all else.
 
     ``chute`` has the fixed parameters, those of the axes at a value that does not matter; ``temperatures`` are
-    those at which flows are looked for; ``within`` is the range searched.
+    those at which flows are searched for; ``within`` is the range searched.
 
     Raises:
         InputError: for twice the same axis, or for a corner that is no chute.

@@ -39,7 +39,7 @@ CAUTION = 4.0
 WIDE = 1e-3
 #: How far a trial of the ITP method is pushed across the zero of the secant, in units of the first bracket.
 PUSH = 0.02
-#: How far beyond the end of a segment a change of sign is looked for, as a fraction of the chord.
+#: How far beyond the end of a segment a change of sign is searched for, as a fraction of the chord.
 FARTHEST = 0.1
 #: A curve is closed by a segment that passes its start within this part of its length, at up to this angle,
 #: and may miss its ends by this fraction.

@@ -55,7 +55,7 @@ _TEMPERATURES = tuple(
 )
 #: A region gets a label where a circle of this fraction of the axes fits into it.
 _ROOM = 0.035
-#: Side of the raster on which that is looked for.
+#: Side of the raster on which that is searched for.
 _RASTER = 160
 _LINE = 1.1
 
@@ -63,7 +63,7 @@ _LINE = 1.1
 @style.own_settings()
 def plot_domain(found: Domain) -> Figure:
     """Two panels: how many flows share one flux, with the bounds of hot flows and hidden branches hatched; and the
-    kinds of density and interior, with the bounds of flows at the temperatures asked for."""
+    kinds of density and interior, with the bounds of flows at the requested temperatures."""
     figure, axes = style.panels(2, width=7.6, height=4.7)
     _number_panel(axes[0], found)
     _kind_panel(axes[1], found)

@@ -20,7 +20,7 @@ _SHADE = 0.25
 
 
 def plot_prediction(found: Prediction) -> Figure:
-    """First the curve with its band, folds and the flows asked for, then profiles of these."""
+    """First the curve with its band, folds and the requested flows, then profiles of these."""
     figure, axes = style.panels(4, width=10.0, height=2.9)
     ax = axes[0]
     for band in found.bands:

@@ -27,7 +27,8 @@ from chuteflow.threads import on_one_thread
 #: Flows of a branch that are examined by default, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
 _MOST_SAMPLES = 2000
-#: Growth, in units of what counts as growth, below which a neutral point is looked for; flows and points of its plane.
+#: Growth, in units of what counts as growth, below which a neutral point is searched for; flows and points of its
+#: plane.
 _SLOW, _MEMBERS, _PLANE = 30.0, 5, (7, 5)
 #: How far the plane reaches into the stable range, in brackets of the verdict.
 _REACHES = (3.0, 12.0, 64.0)

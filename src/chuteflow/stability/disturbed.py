@@ -20,7 +20,7 @@ from chuteflow.steady.flow import Flow
 
 #: Flows of a branch between which others are solved, and the range of surface temperatures, where a chute is given.
 FLOWS, TEMPERATURES = 80, (0.05, 50.0)
-#: How long a flow is followed, and by how much it is heated, unless something else is asked for.
+#: How long a flow is followed, and by how much it is heated, by default.
 DURATION, LONGEST, HEAT = 2000.0, 1e8, 1.1
 Progress = Callable[[float], None]
 
@@ -98,7 +98,7 @@ def relax(
 
     Raises:
         InputError: for a factor or duration out of range.
-        SolveError: where the integration cannot go on.
+        SolveError: where the integration cannot continue.
     """
     duration = number("duration", duration)
     if not 0.0 < duration <= LONGEST:

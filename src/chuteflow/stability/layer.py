@@ -67,7 +67,7 @@ class Power:
     """Rates of energy per unit area of the base, in rho_p (g d cos theta)^(3/2).
 
     ``gravity`` is s Q, its work along the slope; ``collisions`` of the grains with each other and with the
-    ``base`` lose energy. Without heat through the surface the total energy changes with what is left of it.
+    ``base`` lose energy. Without heat through the surface the total energy changes with what is left.
     """
 
     gravity: float

@@ -43,7 +43,7 @@ _TAIL = 0.03
 #: Largest fraction that the change between grids may have in the distance to the continuous spectrum; what moves by
 #: more than the second on the finest grids is an artefact of them.
 _DRIFT, _ARTEFACT = 1e-3, 0.03
-#: Error of a rate that is asked for by default; relative for rates above 1.
+#: Default error of a rate; relative for rates above 1.
 TOLERANCE = 1e-6
 #: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
 NEUTRAL, AT_REST = 1e-6, 1e-10

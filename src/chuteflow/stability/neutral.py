@@ -229,7 +229,7 @@ def _edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
 def _at_edge(
     system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: ContinuationSettings
 ) -> Iterator[_Neutral]:
-    """The point of the curve where coordinate ``which`` is ``edge``, if there is one to be had."""
+    """The point of the curve where coordinate ``which`` is ``edge``, if there is one."""
     fraction = (edge - inside[which]) / (outside[which] - inside[which])
     direction = np.eye(2)[which]
     for point in trace(system, inside + fraction * (outside - inside), direction=direction, control=control):

@@ -94,7 +94,7 @@ def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERA
         tolerance: relative error of each step in tau, u, w and T.
 
     Raises:
-        SolveError: where the integration cannot go on.
+        SolveError: where the integration cannot continue.
     """
     stepper = Radau(
         lambda _, y: layer.rate(y),

@@ -237,7 +237,7 @@ class _ModeSearch:
                     self._certify(maximum)
 
     def _polish(self) -> None:
-        """Climb once more to rounding, on the grid that the best mode was computed on."""
+        """Maximise again to rounding, on the grid that the best mode was computed on."""
         mode = self.best
         if mode is None or mode.direction == "uniform":
             return

@@ -45,7 +45,7 @@ RANGE, _SHORTEST = (1e-3, 10.0), np.pi
 
 @dataclass(frozen=True, eq=False)
 class Stability(Result):
-    """Whether ``flow`` is stable, and its ``mode`` of largest growth among those that were looked at.
+    """Whether ``flow`` is stable, and its ``mode`` of largest growth among those that were examined.
 
     ``stable`` is True or False only if ``complete``: if all directions and all k in ``searched`` (1/d) were searched,
     and disturbances that are the same all along the chute. It is True if no discrete mode of them grows faster than
@@ -140,7 +140,7 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
 @on_one_thread
 @np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
-    """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
+    """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if possible.
 
     Raises:
         InputError: for wavenumbers out of range, and where stability cannot be posed.

@@ -179,7 +179,7 @@ class Elements:
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
-        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is asked for."""
+        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is requested."""
         ends, slopes = self.ends.copy(), self.slopes.copy()
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
         errors = np.zeros((2 if rounding else 0, 4))

@@ -19,7 +19,7 @@ from chuteflow.steady.model import Model
 from chuteflow.theory.constitutive import Law
 from chuteflow.threads import on_one_thread
 
-#: Relative tolerance in Q, h and M unless another is asked for.
+#: Relative tolerance in Q, h and M by default.
 TOLERANCE = 1e-10
 #: Least error ever claimed, and factor by which rounding may do more than in the cases that are tried.
 _FLOOR, _SAFETY = 1e-12, 4.0
@@ -119,7 +119,7 @@ class Solution:
 
 
 def checked_tolerance(tolerance: float) -> float:
-    """A relative tolerance as it was given, once it is sure that it can be asked for.
+    """The relative tolerance, checked to be in the range allowed.
 
     Raises:
         InputError: if it is out of range.
@@ -158,7 +158,7 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     value = float(weights @ solution.macroscopic)
     found, agrees = _on_grids(solution, weights, value)
     if not agrees and solution.error > TOLERANCE:
-        # A flow that was asked for roughly: between the ends of its elements it has fewer digits than its integrals.
+        # A flow that was requested roughly: between the ends of its elements it has fewer digits than its integrals.
         finer = solve(solution.elements.halved(), Condition(tuple(weights.tolist()), value), TOLERANCE)
         if finer.converged:
             found, _ = _on_grids(finer, weights, value)

@@ -42,7 +42,7 @@ _ROUNDS = 14
 _WIDENINGS, _LEADS = 4, 0.25
 #: Flows this near to the largest hold-up, in the logarithm, may lead beyond it, with at most this power of M.
 _AT_EDGE, _STEEPEST = 0.3, 4.0
-#: Columns reach to hold-ups a little beyond those asked for, so that no flow lies beside the last one.
+#: Columns reach to hold-ups a little beyond the requested ones, so that no flow lies beside the last one.
 _BEYOND = 1.1
 #: Where two flows meet, the value there lies within this many of their distances, this many steps in ln T beside, and
 #: a little.
@@ -54,7 +54,7 @@ _SAG, _NOISE = 0.5, 2e-5
 _NARROWEST = 1e-3
 #: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
-#: A flow meets the value asked for to this.
+#: A flow meets the requested value to this.
 _MEETS = 1e-11
 
 
@@ -94,7 +94,7 @@ class Brackets(AlignedArrays):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The chutes, the quantity asked for by its place in the macroscopic ones, ln of its values (n,), and the ends of
+    """The chutes, the requested quantity by its place in the macroscopic ones, ln of its values (n,), and the ends of
     the members."""
 
     batch: Batch
@@ -177,7 +177,7 @@ def at_quantity(
 
 def _widened(problem: Problem, columns: ScannedFlows, edge: int) -> ScannedFlows:
     """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the range
-    towards the value asked for, as :func:`chuteflow.flows` has it."""
+    towards the requested value, as :func:`chuteflow.flows` has it."""
     for _ in range(_WIDENINGS):
         ends = np.flatnonzero(np.diff(columns.member, append=-1) if edge > 0 else np.diff(columns.member, prepend=-1))
         before = ends - edge
@@ -202,7 +202,7 @@ def _widened(problem: Problem, columns: ScannedFlows, edge: int) -> ScannedFlows
 
 
 def _deeper(problem: Problem, columns: ScannedFlows) -> NDArray[np.bool_]:
-    """The columns with flows near the largest hold-up that may lead beyond it, to the value asked for."""
+    """The columns with flows near the largest hold-up that may lead beyond it, to the requested value."""
     log_m, target = columns.flows[..., LOG_M], problem.target[columns.member, None]
     left = target - columns.flows[..., problem.which]
     with np.errstate(invalid="ignore"):
@@ -258,7 +258,7 @@ def _unlinked(
     step: Array,
     deepest: Array,
 ) -> NDArray[np.bool_]:
-    """Where flows of neighbouring columns that do not go over into each other may hide the value asked for."""
+    """Where flows of neighbouring columns that do not go over into each other may hide the requested value."""
     apart = _APART + _BY_TEMPERATURE * step
     place = np.arange(_MOST)
     # From below, flows may go over into each other with other places.

@@ -56,7 +56,7 @@ def meets_base(at: Pointwise, _: Indices) -> Array:
 
 
 def flows_on(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
-    """The zeros of :func:`meets_base` as flows, without an error as yet."""
+    """The zeros of :func:`meets_base` as flows, without an error yet."""
     member, state = found.member, found.state
     at = batch.take(member).at_state(state)
     mass = at.p - batch.surface_stress

@@ -198,7 +198,7 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    have their stability computed or are asked for what is not carried along, or the law has breaks, at which
+    need their stability or quantities that batches do not compute, or the law has breaks, at which
     integration in a batch would lose its order."""
     singly = needs_stability(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
     if not len(batch) or singly or not batch.law.smooth:

@@ -34,11 +34,11 @@ _THIN = (1e-2, 1e-3, 1e-6)
 _FIRMLY = 1.2
 _COLD = 4.0
 _MOST_STEPS = 4000
-#: Parts of a step that is looked at more closely.
+#: Parts of a step that is examined more closely.
 _PARTS = 8
 #: A zero is known to this fraction of its step, or where its event is this small.
 _RESOLUTION, _SMALL = 4e-15, 1e-16
-#: A turn of an event this near to zero, in the spread of its values in the step, is looked at more closely.
+#: A turn of an event this near to zero, in the spread of its values in the step, is examined more closely.
 _NEAR = 0.3
 #: Nodes of Gauss's rule with three points on [0, 1], and its weights.
 _GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
@@ -101,7 +101,7 @@ def _hot_end(batch: Batch, x: float) -> Array:
     where it points away from it.
     """
     empty, thin = (batch.at_density(np.full(len(batch), one)) for one in (1e-12, x))
-    # All are nearly straight in X so close to the empty state, and lie between the ends, give or take as much again.
+    # All are nearly straight in X so close to the empty state, and lie between the ends, within as much again.
     (a_low, a_high), (net_low, net_high), (base_low, base_high) = (_span(empty[i], thin[i]) for i in range(3))
     loses = (net_low > 0.0) & (a_low > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):

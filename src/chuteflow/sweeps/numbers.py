@@ -17,7 +17,7 @@ from chuteflow.sweeps.stability import STABILITY_KINDS
 
 #: Names of kinds in the order of their flags.
 KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **STABILITY_KINDS}
-#: With which flows are looked at once more for what happens on the way to the base.
+#: With which flows are examined again for what happens on the way to the base.
 _ACCURACY = Accuracy(1e-10, 1e-7)
 #: Net loss within this of zero, in its largest value on the way, decides nothing.
 _DECIDES = 1e-9

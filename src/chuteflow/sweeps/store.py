@@ -45,7 +45,7 @@ from chuteflow.sweeps.stability import STABILITY_NUMBERS
 from chuteflow.sweeps.study import Column, Study, from_canonical
 
 _OWN, _DONE, _PARTIAL, _COLUMNS = ".chuteflow", "done", "partial", "columns"
-#: The file that holds the folder of the study, in which the laws of files are looked for.
+#: The file that holds the folder of the study, in which the laws of files are searched for.
 _FOLDER = "folder"
 _LEVEL = 1
 #: The version whose markers name none.

@@ -138,7 +138,7 @@ def read(path: str | os.PathLike[str]) -> Study:
 
 def from_canonical(text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()) -> Study:
     """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it; laws
-    of files are looked for from ``folder``.
+    of files are searched for from ``folder``.
 
     Raises:
         InputError: for what is no canonical form, or a column that is not the one meant.

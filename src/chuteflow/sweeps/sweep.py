@@ -27,7 +27,7 @@ def sweep(
 
     Args:
         study: a TOML file, its table as a dictionary, or a study.
-        out: the store to make or go on with.
+        out: the store to create or continue.
         workers: processes; one for each core by default.
         progress: called with the fraction that is done.
 

@@ -46,7 +46,7 @@ class BaseCondition:
         function."""
 
     def checked_roughness(self, value: Any) -> float:
-        """The roughness once it is sure that it can be asked for.
+        """The roughness, checked to be in the range of the condition.
 
         Raises:
             InputError: for one out of range.

@@ -12,7 +12,7 @@ import math
 from chuteflow.parameters import PARAMETERS
 from chuteflow.theory.constitutive import Field
 
-#: Normal stress at the interface of Jenkins & Hanes (1993), (3.31) with its misprint mended.
+#: Normal stress at the interface of Jenkins & Hanes (1993), (3.31) with its misprint corrected.
 INTERFACE_STRESS = math.sqrt(math.pi) / 48.0
 
 #: Range of the roughness for wall grains of the size of the flowing ones, section 2.2.

@@ -90,7 +90,7 @@ class Law:
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
     is a function of nu and the slope. ``breaks`` are the volume fractions at which a coefficient is not smooth, or
     a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
-    the text by which it was asked for, where that was not its name, see :mod:`chuteflow.theory.laws`.
+    the text by which it was requested, where that was not its name, see :mod:`chuteflow.theory.laws`.
 
     ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, rate)``, the
     coefficients where the shear rate over nu sqrt(T) is ``rate``, for disturbed flows of a law that ``knows_slope``.

@@ -109,7 +109,7 @@ class HotParameters:
     def obstacle(self) -> str | None:
         """One sentence on why there is no hot flow; None where there is one, and then there is just one.
 
-        The signs of F21 and delta are looked at apart: that of lambda is always that of delta.
+        The signs of F21 and delta are examined apart: that of lambda is always that of delta.
         """
         base, interior = np.sign(self.F21), -np.sign(self.delta)
         if base > 0.0 > interior:

@@ -114,7 +114,7 @@ def motion(fields: Fields, gradient: Gradient, grains: Material) -> Motion:
 def closures(grains: Material, nu: Number, rate: Callable[[], Number]) -> list[Number]:
     """g0 to g6 of table 1 at ``nu``, in the order radial, g1, g2, g3, g4, g5, g6.
 
-    ``rate`` gives the shear rate over nu sqrt(T); it is asked for where the dissipation of the law depends on it.
+    ``rate`` gives the shear rate over nu sqrt(T); it is requested where the dissipation of the law depends on it.
     """
     law, e = grains.law, grains.restitution
     if law.knows_slope:

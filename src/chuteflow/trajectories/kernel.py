@@ -48,7 +48,7 @@ FREE, HOT, LOW_FLUX, COLD, BEYOND = range(5)
 DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 #: States are no longer advanced where y is below this multiple of the scale of fluxes, or L above this.
 _COLDEST, _DENSEST = -8.0, 55.0
-#: Places between two states at which the residual is looked at.
+#: Places between two states at which the residual is examined.
 _BETWEEN = 5
 #: Trajectories inserted into one interval in one depth step at most.
 _MOST_INSERTED = 12
@@ -324,9 +324,9 @@ def integrate(
     ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``.
 
     Returns the states of all depth steps (N, 5), the place in the step before from which each came (N,), between two
-    states where it was inserted, whether the curve goes on from each to the next (N,), the first position of each step
-    (R + 1,), the first states of the cells that could not be decided (U,), how many cells were examined, and how the
-    curve ended.
+    states where it was inserted, whether the curve continues from each to the next (N,), the first position of each
+    step (R + 1,), the first states of the cells that could not be decided (U,), how many cells were examined, and how
+    the curve ended.
     """
     n = len(log_t)
     states = np.empty((64 * n + 1024, 5))
@@ -342,7 +342,7 @@ def integrate(
     theta = np.empty(len(curve))  # heat potential at the surface
     in_series = np.zeros(len(curve), np.bool_)
     stopped = np.zeros(len(curve), np.bool_)  # no longer advanced
-    connected = np.ones(len(curve), np.bool_)  # whether the curve goes on to the next position
+    connected = np.ones(len(curve), np.bool_)  # whether the curve continues to the next position
     region = np.empty(len(curve), np.int64)
     residual = np.empty(len(curve))
     length = np.empty(len(curve))  # distance from the next position

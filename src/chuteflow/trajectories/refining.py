@@ -55,7 +55,7 @@ class Refinement:
     most: int = 1_200_000
 
 
-#: The refinement of every search unless another is asked for.
+#: The refinement of every search by default.
 REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.

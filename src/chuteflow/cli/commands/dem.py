@@ -79,7 +79,7 @@ def command() -> None:
 @options.quiet_option
 @click.option("--write-only", is_flag=True, help="Write the input of LAMMPS into the folder, to run it elsewhere.")
 def run_command(**given: Any) -> None:
-    """Simulate a chute; what was interrupted or killed goes on with the same command."""
+    """Simulate a chute; what was interrupted or killed continues with the same command."""
     from chuteflow.dem.engine import engine, require_processes
     from chuteflow.dem.run import prepare
 

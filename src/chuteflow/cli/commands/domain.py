@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.quantities import Scales
 
-#: Processes at most, unless another number is asked for.
+#: Processes at most, by default.
 _MOST_PROCESSES = 8
 _EPILOG = (
     "Example: chuteflow domain --slope 0.1:0.5 --roughness 0.5:0.866 --e 0.8 --ew 0.8 --temperature 1,10,100"

@@ -75,7 +75,7 @@ class Chunks(click.ParamType):
 @options.quiet_option
 @click.option("--no-check", is_flag=True, help="Trust the markers of the store; do not check its arrays.")
 def command(study: str, **given: Any) -> None:
-    """Read the study, compute what is left of it and tell what came out."""
+    """Read the study, compute the rest of it and print the results."""
     from chuteflow.sweeps.study import read
 
     read_study = read(study)

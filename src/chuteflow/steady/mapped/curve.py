@@ -25,7 +25,7 @@ from chuteflow.steady.solver import Condition, SolverStatus
 CONTROL = ContinuationSettings(
     initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600
 )
-#: Range of T_surface followed unless another is asked for: few chutes are within reach of N = 400 below it.
+#: Range of T_surface followed by default: few chutes are within reach of N = 400 below it.
 SURFACE_TEMPERATURE = (0.05, 100.0)
 #: Estimated relative error of Q, h and M up to which a flow is taken for one.
 TOLERANCE = 1e-8
