@@ -805,12 +805,10 @@ def test_the_map_follows_the_sliders_coarsely_and_is_fine_when_they_rest(page):
     def column(route):
         query = parse_qs(urlsplit(route.request.url).query)
         part = {"stops": [0.6 + 0.2 * place_of(route) ** 2], "values": [1, 2]}
-        parts = dict.fromkeys(("most", "families", "interior", "density"), part)
-        if "coarse" not in query:
-            parts["hot"] = part
-            if hold:
-                held.append(route)
-                return
+        if "coarse" not in query and hold:
+            held.append(route)
+            return
+        parts = dict.fromkeys(("most", "families", "interior", "density", "hot"), part)
         asked.append((query["e"][0], "coarse" in query))
         at = 0.05 + 0.65 * place_of(route)
         route.fulfill(json={"outer": "slope", "inner": "roughness", "at": at, "parts": parts, "tolerance": 0.01})
