@@ -217,7 +217,7 @@ def try_command_lines(count: int, seed: int) -> tuple[list[str], Counter]:
 def try_files(wholes, same, folder, count: int, seed: int) -> tuple[list[str], Counter]:
     """Faults of ``count`` damaged copies of the files ``wholes``, made in ``folder``, and how often each end came.
 
-    ``same(whole, found)`` tells whether what was loaded is what the whole file holds.
+    ``same(whole, found)`` is whether what was loaded is what the whole file holds.
     """
     dice = random.Random(seed)
     faults, ends = [], Counter()

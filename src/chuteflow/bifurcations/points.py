@@ -17,7 +17,7 @@ from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.solver import Solution, Status, prolong
+from chuteflow.steady.solver import Solution, SolverStatus, prolong
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
 _STEP = 1e-7
@@ -93,7 +93,7 @@ def as_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     problem = system.problem(float(w[-1]))
     problem = replace(problem, model=replace(problem.model, chute=chute))
     z = w[:-1]
-    solution = Solution(problem.state(z).macroscopic(), error, Status.CONVERGED, (problem, z))
+    solution = Solution(problem.state(z).macroscopic(), error, SolverStatus.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 
 

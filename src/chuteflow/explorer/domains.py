@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from chuteflow.explorer.queries import CONTROLS, ColumnAsked
-from chuteflow.maps.columns import Part, column
-from chuteflow.maps.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
+from chuteflow.maps.columns import PiecewiseConstant, column
+from chuteflow.maps.plane import HOT_CODES, SUMMARY, ParameterAxis, ParameterPlane, hot_code, summary
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 
@@ -31,7 +31,7 @@ class MapColumn:
     outer: str
     inner: str
     at: float
-    parts: dict[str, Part]
+    parts: dict[str, PiecewiseConstant]
     tolerance: float
 
 
@@ -56,21 +56,21 @@ def map_column(asked: ColumnAsked) -> MapColumn:
         outer,
         inner,
         float(plane.outer.at(place)),
-        {name: Part(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
+        {name: PiecewiseConstant(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
 
 
-def _beside(plane: Plane, asked: ColumnAsked, tolerance: float) -> list[float]:
+def _beside(plane: ParameterPlane, asked: ColumnAsked, tolerance: float) -> list[float]:
     """Shares of the inner axis a little to either side of what is near, closer together than what is halved."""
     shares = [(value - plane.inner.low) / (plane.inner.high - plane.inner.low) for value in asked.near]
     return [share + side * tolerance for share in shares for side in (-0.49, 0.49)]
 
 
 @lru_cache(maxsize=8)
-def _plane(chute: Chute, x: str, y: str) -> Plane:
-    across, up = (Axis(BY_KEY[name].name, CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
-    return Plane(across, up, chute, ())
+def _plane(chute: Chute, x: str, y: str) -> ParameterPlane:
+    across, up = (ParameterAxis(BY_KEY[name].name, CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
+    return ParameterPlane(across, up, chute, ())
 
 
 def _evenly(count: int) -> list[float]:

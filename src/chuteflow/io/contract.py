@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
-from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
@@ -172,7 +172,7 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
     return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
 
 
-def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:
+def _count(chute: Chute, count: FlowCount, scales: Scales | None) -> dict[str, Any]:
     flux = factor("mass_flux", chute, scales)
     return {
         "Q_from": count.low * flux,

@@ -7,7 +7,7 @@ from typing import Any
 from chuteflow.io.contract import PLACE, factor
 from chuteflow.io.stability_records import mode_object
 from chuteflow.io.tables import number
-from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, Run
+from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, StabilityRun
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
@@ -24,7 +24,7 @@ LABELS = {
 
 
 def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
-    """The judged flows of each branch: their place, whether they are stable, and the mode that grows fastest.
+    """The examined flows of each branch: their place, whether they are stable, and the mode that grows fastest.
 
     ``stable`` is null where it is not known.
     """
@@ -70,7 +70,7 @@ def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
     return {NUMBERS[name].symbol: getattr(flow, name) * factor(name, flow.chute, scales) for name in PLACE}
 
 
-def stretch(run: Run, chute: Chute, scales: Scales | None) -> str:
+def stretch(run: StabilityRun, chute: Chute, scales: Scales | None) -> str:
     """A stretch of a curve in words, by its surface temperatures."""
     scale = factor("surface_temperature", chute, scales)
     ends = (number(flow.surface_temperature * scale) for flow in (run.flows[0], run.flows[-1]))

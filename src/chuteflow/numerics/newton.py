@@ -50,14 +50,14 @@ def newton(
                 return NewtonResult(z, False, iteration, np.inf)
             if step_size < tolerance:
                 return NewtonResult(z + step, True, iteration, step_size)
-            share = min(1.0, longest_step / step_size)
+            fraction = min(1.0, longest_step / step_size)
             for _ in range(8):
-                trial = z + share * step
+                trial = z + fraction * step
                 f_trial, jacobian_trial = system(trial)
                 size_trial = float(np.abs(f_trial).max())
-                if size_trial < size * (1.0 - 0.1 * share) or step_size < 1e-4:
+                if size_trial < size * (1.0 - 0.1 * fraction) or step_size < 1e-4:
                     break
-                share *= 0.5
+                fraction *= 0.5
             else:
                 return NewtonResult(z, False, iteration, step_size)
             z, f, jacobian, size = trial, f_trial, jacobian_trial, size_trial

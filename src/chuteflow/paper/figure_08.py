@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 SLOPE = 0.3
 #: Strokes and words of the two curves.
 LINES = {
-    "free": (style.Stroke(style.BLUE, style.SOLID), "asymptotic conditions"),
-    "interface": (style.Stroke(style.VERMILION, style.DASHED), "interface conditions"),
+    "free": (style.LineStyle(style.BLUE, style.SOLID), "asymptotic conditions"),
+    "interface": (style.LineStyle(style.VERMILION, style.DASHED), "interface conditions"),
 }
 #: Where the panel ends in Q and h.
 RIGHT, TOP = 6.0, 15.0

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 SLOPE = 0.3
 #: Strokes and words of the two curves.
 LINES = {
-    "lun": (style.Stroke(style.BLUE, style.SOLID), "modified Fourier"),
-    "lun-fourier": (style.Stroke(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
+    "lun": (style.LineStyle(style.BLUE, style.SOLID), "modified Fourier"),
+    "lun-fourier": (style.LineStyle(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
 }
 #: Where the panel ends in Q and h.
 RIGHT, TOP = 6.0, 15.0

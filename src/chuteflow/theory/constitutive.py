@@ -21,6 +21,7 @@ import hashlib
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -204,9 +205,9 @@ class Reduced:
     - ``conduction`` = g3 nu/g1, with which y = conduction dtheta/dp;
     - ``drift`` = nu g4/g3, with theta = ln T - Gamma and dGamma/dln nu = drift; where dilute it is -b, and b is 0 but
       for laws whose g4 grows like 1/nu; ``coupling`` = (drift + b)/nu;
-    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
+    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation minus production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
-    - ``grip`` = A g1/g2, of the slip condition (3.16);
+    - ``wall_shear`` = A g1/g2, of the slip condition (3.16);
     - ``radial`` = g0, ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
     """
 
@@ -216,7 +217,7 @@ class Reduced:
     loss: Field
     work: Field
     shear: Field
-    grip: Field
+    wall_shear: Field
     radial: Field
     compressibility: Field
     stiffness: Field
@@ -242,7 +243,7 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
         loss=g.dissipation / big_g,
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
-        grip=big_g * nu_contact / g.viscosity,
+        wall_shear=big_g * nu_contact / g.viscosity,
         radial=g.radial,
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
@@ -308,6 +309,12 @@ def require_positive(law: Law, e: float, slope: float) -> None:
     Raises:
         InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
+    _require_positive(law, e, slope if law.knows_slope else 1.0)
+
+
+# Maps ask for thousands of chutes of the same grains.
+@lru_cache(maxsize=256)
+def _require_positive(law: Law, e: float, slope: float) -> None:
     nu, _, g = law.at(_TRIED, e, slope)
     if not isinstance(g, Coefficients):
         raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")

@@ -11,6 +11,7 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 
 if TYPE_CHECKING:
     from chuteflow.steady.quantities import Scales
@@ -39,7 +40,7 @@ _EPILOG = (
 )
 @options.search_range_options
 @click.option("--port", type=click.IntRange(0, 65535), help="Port; 8765 or another free one by default, 0 for any.")
-@options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, this machine alone, by default.")
+@options.option("--host", metavar="ADDRESS", help="Address to listen at; 127.0.0.1, only this machine, by default.")
 @click.option("--no-browser", is_flag=True, help="Do not open a browser.")
 @options.quiet_option
 def command(**given: Any) -> None:
@@ -152,6 +153,8 @@ def _material(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _serve(given: Mapping[str, Any], query: str, data: list[dict[str, Any]]) -> None:
+    for name in ("starlette", "uvicorn"):
+        require(name, "explore", "the explorer")
     import uvicorn
 
     from chuteflow.explorer.connections import Connection, Server
