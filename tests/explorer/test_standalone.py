@@ -24,6 +24,7 @@ def found():
     return sampled.sampled(CHUTE, 60, SURFACE_TEMPERATURE, LARGEST_HOLDUP)
 
 
+@pytest.mark.slow
 def test_what_is_told_of_the_error_is_the_error(found):
     (one,) = found.branches
     finer = chuteflow.curve(CHUTE, points=178, tolerance=1e-8).branches[0].flows
@@ -39,6 +40,7 @@ def test_what_is_told_of_the_error_is_the_error(found):
     assert max(found.deviation.fields.values()) < 0.1
 
 
+@pytest.mark.slow
 def test_the_error_grows_where_flows_are_kept_wrong(found):
     (one,) = found.branches
     fields = one.fields.copy()
@@ -83,6 +85,7 @@ def test_one_file_that_loads_nothing(tmp_path, monkeypatch, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
+@pytest.mark.slow
 def test_the_range_is_narrowed_and_said(tmp_path, monkeypatch):
     monkeypatch.setattr(standalone, "_POINTS", (40,))
     path = tmp_path / "page.html"
@@ -92,6 +95,7 @@ def test_the_range_is_narrowed_and_said(tmp_path, monkeypatch):
     assert "T_surface from 0.009396 to 0.04698 m^2/s^2" in path.read_text()
 
 
+@pytest.mark.slow
 def test_a_page_that_grows_too_large_has_fewer_flows(monkeypatch):
     asked = []
     original = standalone.sampled

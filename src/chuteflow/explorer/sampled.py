@@ -100,7 +100,7 @@ def interpolated(table: Array, positions: Array) -> Array:
     a, b, c, d = (positions - first - k for k in range(4))
     weights = -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
     shape = (-1,) + (1,) * (table.ndim - 1)
-    return sum(weight.reshape(shape) * table[first + k] for k, weight in enumerate(weights))
+    return np.sum([weight.reshape(shape) * table[first + k] for k, weight in enumerate(weights)], axis=0)
 
 
 def _sampled(branch: Branch) -> SampledBranch:
