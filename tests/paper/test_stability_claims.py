@@ -31,7 +31,7 @@ def known(monkeypatch):
     return table, examined
 
 
-def test_verdicts_follow_from_the_flows(known):
+def test_results_follow_from_the_flows(known):
     assert [CLAIMS[id].check().verdict for id in IDS] == ["confirmed"] * 3
 
 

@@ -18,7 +18,7 @@ from chuteflow.numerics.eigenproblem import Inverse
 from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import Operator, operator
 from chuteflow.stability.modes import Disturbances
-from chuteflow.stability.verdict import leading, wavenumbers
+from chuteflow.stability.result import leading, wavenumbers
 
 #: Degrees of the grid of the map, tried in turn; relative difference of rates from those of the search that will do.
 DEGREES, ALIKE = (20, 26, 32), 0.02

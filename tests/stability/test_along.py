@@ -9,7 +9,7 @@ import pytest
 import chuteflow
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability import along
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 
 PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 

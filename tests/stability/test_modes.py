@@ -10,7 +10,7 @@ from chuteflow.numerics.eigenproblem import drift, refined, spectrum
 from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import operator, without_top
 from chuteflow.stability.modes import Disturbances, relative_fields
-from chuteflow.stability.verdict import leading
+from chuteflow.stability.result import leading
 from chuteflow.steady.chute import Chute
 
 from .reference import Problem

@@ -12,7 +12,7 @@ from chuteflow.errors import InputError
 from chuteflow.stability.modes import Disturbances
 from chuteflow.stability.neutral import EigenvalueGrid, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, family_map, wave_map
-from chuteflow.stability.verdict import leading
+from chuteflow.stability.result import leading
 
 PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 

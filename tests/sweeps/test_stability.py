@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import chuteflow
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.stability import STABILITY_KINDS
 from chuteflow.sweeps.store import variables

@@ -23,7 +23,7 @@ from chuteflow.maps.kinds import DENSITIES as DENSITY_BITS
 from chuteflow.maps.kinds import INTERIORS as INTERIOR_BITS
 from chuteflow.stability.planes import FamilyMap, WaveMap
 from chuteflow.stability.relaxation import Relaxation
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.hot import HotModel

@@ -12,7 +12,7 @@ from chuteflow.io.contract import chute_object, factor, finite, flow_object, sea
 from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.stability.budget import ModeBudget
 from chuteflow.stability.modes import Mode
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.quantities import DISTURBANCES, NUMBERS, Scales
 

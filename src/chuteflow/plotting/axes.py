@@ -25,7 +25,7 @@ from chuteflow.plotting.stability_plot import plot_modes
 from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.stability.planes import FamilyMap, WaveMap
 from chuteflow.stability.relaxation import Relaxation
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.hot import HotModel
 from chuteflow.steady.quantities import Scales

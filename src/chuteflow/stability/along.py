@@ -20,7 +20,7 @@ from chuteflow.errors import SolveError
 from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import End, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, scanned
-from chuteflow.stability.verdict import RANGE, Stability, stability_of
+from chuteflow.stability.result import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -30,7 +30,7 @@ _MOST_SAMPLES = 2000
 #: Growth, in units of what counts as growth, below which a neutral point is searched for; flows and points of its
 #: plane.
 _SLOW, _MEMBERS, _PLANE = 30.0, 5, (7, 5)
-#: How far the plane reaches into the stable range, in brackets of the verdict.
+#: How far the plane reaches into the stable range, in brackets of the stability result.
 _REACHES = (3.0, 12.0, 64.0)
 #: The special point between a stable and an unstable flow.
 CHANGE = "stability-change"

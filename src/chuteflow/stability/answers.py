@@ -7,7 +7,7 @@ from functools import cached_property
 
 from chuteflow.stability.budget import ModeBudget, energy_budget
 from chuteflow.stability.modes import Mode
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.flow import Flow
 
 

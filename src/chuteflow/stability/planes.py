@@ -21,7 +21,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import EigenvalueGrid, NeutralCurve, NeutralPlane, neutral_curves
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 

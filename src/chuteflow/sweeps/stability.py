@@ -29,7 +29,7 @@ def stability_quantities(flow: Flow) -> tuple[dict[str, float], str | None]:
 
     What is not known, and the mode where the continuous spectrum hides all of them, is left out.
     """
-    from chuteflow.stability.verdict import stability_of
+    from chuteflow.stability.result import stability_of
 
     try:
         found = stability_of(flow)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from chuteflow.stability.answers import StabilityAnswer
     from chuteflow.stability.budget import ModeBudget
     from chuteflow.stability.modes import Mode
-    from chuteflow.stability.verdict import Stability
+    from chuteflow.stability.result import Stability
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
@@ -41,7 +41,7 @@ _HEADING = (
     ("mode", "kx", "ky", "growth", "speed", "error"),
     ("", "[1/m]", "[1/m]", "[1/s]", "[m/s]", "[1/s]"),
 )
-_VERDICTS = {True: "stable", False: "unstable", None: "?"}
+_STATES = {True: "stable", False: "unstable", None: "?"}
 
 
 @click.command("stability", help=COMMANDS["stability"], epilog=_EPILOG)
@@ -102,7 +102,7 @@ def command(as_json: bool, **given: Any) -> None:
 
 def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> StabilityAnswer:
     from chuteflow.stability.answers import StabilityAnswer
-    from chuteflow.stability.verdict import leading_modes, stability_of
+    from chuteflow.stability.result import leading_modes, stability_of
 
     try:
         stability = stability_of(flow, kx=kx, ky=ky)
@@ -179,11 +179,11 @@ def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: 
     chute = answer.flow.chute
     wave, rate, speed_unit = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
     start = [number, *tables.numbers(answer.flow, columns, chute, scales)]
-    verdict = _VERDICTS[None if answer.found is None else answer.found.stable]
+    state = _STATES[None if answer.found is None else answer.found.stable]
     if not answer.modes:
-        yield [*start, verdict, *("-" for _ in range(6))]
+        yield [*start, state, *("-" for _ in range(6))]
     for i, mode in enumerate(answer.modes):
-        place = [*start, verdict] if i == 0 else [""] * (len(start) + 1)
+        place = [*start, state] if i == 0 else [""] * (len(start) + 1)
         speed = "-" if mode.speed is None else tables.number(speed_unit * mode.speed)
         numbers = map(tables.number, (wave * mode.kx, wave * mode.ky, rate * mode.growth))
         yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
@@ -205,7 +205,7 @@ def _fed(budget: ModeBudget, said: _DisturbanceFormat) -> str:
 
 
 def _of_all(found: Stability, formatted: _DisturbanceFormat) -> str:
-    """The verdict after all of the range was searched, and what stayed unresolved."""
+    """The result after all of the range was searched, and what stayed unresolved."""
     from chuteflow.io.stability_records import why_unknown
 
     (low, high), mode = found.searched, found.mode

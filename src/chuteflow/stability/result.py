@@ -2,7 +2,7 @@
 
 # notation: k = |(kx, ky)| wavenumber, h centre of mass.
 
-A verdict is given only after the whole range of wavenumbers was searched, see :mod:`chuteflow.stability.search`.
+Stability is decided only after the whole range of wavenumbers was searched, see :mod:`chuteflow.stability.search`.
 What was asked of single wavenumbers says what these waves do, and no more.
 """
 
@@ -77,16 +77,16 @@ class Stability(Result):
         return not self.grows
 
     def __repr__(self) -> str:
-        verdict = "not known" if self.stable is None else "stable" if self.stable else "unstable"
-        return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
+        known = "not known" if self.stable is None else "stable" if self.stable else "unstable"
+        return display.line("Stability", known, None if self.mode is None else repr(self.mode)[1:-1])
 
     def _repr_html_(self) -> str:
         mode = self.mode
         header = ["", "mode", "kx", "ky", "growth", "frequency", "error"]
         numbers = [] if mode is None else [mode.kx, mode.ky, mode.growth, mode.frequency, mode.error]
         cells = ["none"] if mode is None else [mode.kind, *map(display.number, numbers)]
-        verdict = repr(self)[1:-1].split(": ")[1].split("; ")[0]
-        return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
+        known = repr(self)[1:-1].split(": ")[1].split("; ")[0]
+        return display.html_table(f"Stability of {self.flow.name}", header, [[known, *cells]])
 
 
 @on_one_thread

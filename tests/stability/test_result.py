@@ -5,9 +5,9 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, stability_of
-from chuteflow.stability import search, verdict
+from chuteflow.stability import result, search
 from chuteflow.stability.modes import Disturbances, UnresolvedError
-from chuteflow.stability.verdict import growth_map, leading, leading_modes, wavenumbers
+from chuteflow.stability.result import growth_map, leading, leading_modes, wavenumbers
 
 from .population import random_flows, seen_again
 
@@ -107,7 +107,7 @@ def never_told(where):
 
 
 def test_an_unresolved_wave_is_told_and_raises_nothing(three, monkeypatch):
-    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: True))
+    monkeypatch.setattr(result, "leading", never_told(lambda kx, ky: True))
     found = stability_of(three["A"], kx=0.01, ky=0.02)
     assert (found.stable, found.mode, found.grows) == (None, None, False)
     assert found.unresolved == ((0.01, 0.02),)
@@ -149,7 +149,7 @@ def test_a_map_holds_the_leading_modes(three):
 
 
 def test_a_map_goes_on_where_the_grids_do_not_tell(three, monkeypatch):
-    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: kx == 0.0))
+    monkeypatch.setattr(result, "leading", never_told(lambda kx, ky: kx == 0.0))
     found = growth_map(Disturbances(three["C"]), np.array([0.0, 0.01]), np.array([0.0, 0.01]))
     assert found.unresolved.tolist() == [[True, True], [False, False]]
     assert np.isnan(found.growth[0]).all()
