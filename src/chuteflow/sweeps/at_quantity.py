@@ -1,12 +1,12 @@
 """Every flow of many chutes at a given flux, hold-up or centre of mass.
 
-# notation: column the trajectory of one chute from one surface temperature; its flows are counted from the
+# notation: a trajectory is that of one chute from one surface temperature; its flows are counted from the
 # surface down.
 
 The flows of one surface temperature alternate in the sign with which the heat flux passes that of the base, so that
-the k-th of one column goes over into the k-th of the next, unless two have met between them or one has left to
-large hold-ups. Columns are put where that is so, or where the quantity turns, near the value asked for, until
-every flow lies between two columns whose flows are known to go over into each other; there it is found as the
+the k-th of one trajectory goes over into the k-th of the next, unless two have met between them or one has left to
+large hold-ups. Trajectories are added where that is so, or where the quantity turns, near the requested value, until
+every flow lies between two trajectories whose flows are known to go over into each other; there it is found as the
 zero of one function of the surface temperature.
 """
 
@@ -28,31 +28,32 @@ from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error,
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
-#: Columns per decade of surface temperature to begin with.
+#: Trajectories per decade of surface temperature to begin with.
 _PER_DECADE = 4
-#: Accuracy of the columns, and for those whose first flow lies above the start.
+#: Accuracy of the trajectories, and for those whose first flow lies above the start.
 _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
-#: Flows kept of a column; a chute with more is left to the search by branches.
+#: Flows kept of a trajectory; a chute with more is left to the search by branches.
 _MOST = 12
-#: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
+#: Flows of two trajectories go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
-#: Rounds of new columns. The few members that want more are searched one by one, which is cheaper by then.
+#: Rounds of new trajectories. The few members that want more are searched one by one, which is cheaper by then.
 _ROUNDS = 14
 #: The range is widened at most so often, where ln of the quantity rises at least with this power of T.
 _WIDENINGS, _LEADS = 4, 0.25
 #: Flows this near to the largest hold-up, in the logarithm, may lead beyond it, with at most this power of M.
 _AT_EDGE, _STEEPEST = 0.3, 4.0
-#: Columns reach to hold-ups a little beyond the requested ones, so that no flow lies beside the last one.
+#: Trajectories reach to hold-ups a little beyond the requested ones, so that no flow lies beside the last one.
 _BEYOND = 1.1
 #: Where two flows meet, the value there lies within this many of their distances, this many steps in ln T beside, and
 #: a little.
 _ASIDE, _AWAY, _LITTLE = 1.0, 1.0, 1e-3
-#: Between columns a quantity departs from its values there by at most this part of what its slope changes over the
-#: step; and what rough columns may be off.
+#: Between trajectories a quantity departs from its values there by at most this part of what its slope changes over the
+#: step; and what rough trajectories may be off.
 _SAG, _NOISE = 0.5, 2e-5
-#: In steps of ln T narrower than this rough columns do not tell turns from noise: such members are searched one by one.
+#: In steps of ln T narrower than this rough trajectories do not tell turns from noise: such members are searched one by
+#: one.
 _NARROWEST = 1e-3
-#: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
+#: A zero in ln T is known to this by rough trajectories, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
 #: A flow meets the requested value to this.
 _MEETS = 1e-11
@@ -60,7 +61,7 @@ _MEETS = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class ScannedFlows(AlignedArrays):
-    """Columns in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
+    """Trajectories in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
     where that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
 
     member: Indices
@@ -74,14 +75,14 @@ class ScannedFlows(AlignedArrays):
         return both.take(np.lexsort((both.log_t, both.member)))
 
     def of(self, members: NDArray[np.bool_]) -> ScannedFlows:
-        """The columns of some members."""
+        """The trajectories of some members."""
         return self.take(members[self.member])
 
 
 @dataclass(frozen=True, eq=False)
 class Brackets(AlignedArrays):
-    """Flows that lie between two columns: ``member``, ``place`` among the flows from the surface, ends in ln T and the
-    ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
+    """Flows that lie between two trajectories: ``member``, ``place`` among the flows from the surface, ends in ln T and
+    the ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
 
     member: Indices
     place: Indices
@@ -103,8 +104,8 @@ class Problem:
     ends: Ends
     deepest: Array
 
-    def columns(self, member: Indices, log_t: Array) -> ScannedFlows:
-        """Rough columns of ``member`` (c,) at ``log_t`` (c,)."""
+    def trajectories(self, member: Indices, log_t: Array) -> ScannedFlows:
+        """Rough trajectories of ``member`` (c,) at ``log_t`` (c,)."""
         found, trouble = self._marched(member, log_t, _ROUGH)
         again = np.flatnonzero(trouble)
         if again.size:
@@ -145,81 +146,83 @@ def at_quantity(
     low, high = np.log(surface_temperature)
     many = max(int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE)), 2) + 1
     members = np.arange(len(batch))
-    columns = problem.columns(np.repeat(members, many), np.tile(np.linspace(low, high, many), len(batch)))
+    trajectories = problem.trajectories(np.repeat(members, many), np.tile(np.linspace(low, high, many), len(batch)))
     for edge in (1, -1):
-        columns = _widened(problem, columns, edge)
+        trajectories = _widened(problem, trajectories, edge)
     unsettled = np.zeros(len(batch), dtype=bool)
     brackets: list[Brackets] = []
     for _ in range(_ROUNDS):
-        unsettled[columns.member[columns.count < 0]] = True
-        unsettled[columns.member[_deeper(problem, columns)]] = True
-        columns = columns.of(~unsettled)
-        found, split, lost = _links(problem, columns)
-        unsettled[columns.member[lost]] = True
+        unsettled[trajectories.member[trajectories.count < 0]] = True
+        unsettled[trajectories.member[_deeper(problem, trajectories)]] = True
+        trajectories = trajectories.of(~unsettled)
+        found, split, lost = _links(problem, trajectories)
+        unsettled[trajectories.member[lost]] = True
         # A member is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
-        ready[columns.member[split]] = False
+        ready[trajectories.member[split]] = False
         ready &= ~unsettled
         brackets.append(found.take(ready[found.member]))
         going = ~ready & ~unsettled
-        if not going[columns.member].any():
-            columns = columns.of(going)
+        if not going[trajectories.member].any():
+            trajectories = trajectories.of(going)
             break
-        split = split[going[columns.member[split]]]
-        middle = 0.5 * (columns.log_t[split] + columns.log_t[split + 1])
-        columns = columns.joined(problem.columns(columns.member[split], middle)).of(going)
-    unsettled[columns.member] = True
+        split = split[going[trajectories.member[split]]]
+        middle = 0.5 * (trajectories.log_t[split] + trajectories.log_t[split + 1])
+        trajectories = trajectories.joined(problem.trajectories(trajectories.member[split], middle)).of(going)
+    unsettled[trajectories.member] = True
     flows, failed = _found(problem, brackets[0].and_all(brackets[1:]), tolerance)
     unsettled |= failed
     inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.member]) & ~unsettled[flows.member]
     return Flows.joined([flows.take(inside)]), unsettled
 
 
-def _widened(problem: Problem, columns: ScannedFlows, edge: int) -> ScannedFlows:
-    """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the range
-    towards the requested value, as :func:`chuteflow.flows` has it."""
+def _widened(problem: Problem, trajectories: ScannedFlows, edge: int) -> ScannedFlows:
+    """With trajectories beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the
+    range towards the requested value, as :func:`chuteflow.flows` has it."""
     for _ in range(_WIDENINGS):
-        ends = np.flatnonzero(np.diff(columns.member, append=-1) if edge > 0 else np.diff(columns.member, prepend=-1))
+        ends = np.flatnonzero(
+            np.diff(trajectories.member, append=-1) if edge > 0 else np.diff(trajectories.member, prepend=-1)
+        )
         before = ends - edge
-        a, b = columns.flows[before], columns.flows[ends]
-        run = (columns.log_t[ends] - columns.log_t[before])[:, None]
-        left = problem.target[columns.member[ends], None] - b[..., problem.which]
+        a, b = trajectories.flows[before], trajectories.flows[ends]
+        run = (trajectories.log_t[ends] - trajectories.log_t[before])[:, None]
+        left = problem.target[trajectories.member[ends], None] - b[..., problem.which]
         alike = (np.abs(a - b) <= _APART + _BY_TEMPERATURE * np.abs(run)[..., None]).all(axis=-1)
         slope = (b - a)[..., problem.which] / run
         with np.errstate(invalid="ignore"):
             leads = alike & (slope * np.sign(left) * edge > _LEADS)
             reach = np.where(leads, 1.2 * np.abs(left / slope) + 1.0, 0.0).max(axis=1)
         limit = np.log(WIDEST[edge > 0])
-        reach = np.minimum(reach, np.maximum(edge * (limit - columns.log_t[ends]), 0.0))
+        reach = np.minimum(reach, np.maximum(edge * (limit - trajectories.log_t[ends]), 0.0))
         many = np.ceil(reach / np.log(10.0) * _PER_DECADE).astype(np.intp)
         if not many.any():
             break
         which = np.repeat(np.arange(ends.size), many)
         fraction = (np.arange(which.size) - (np.cumsum(many) - many)[which] + 1) / many[which]
-        new = columns.log_t[ends[which]] + edge * reach[which] * fraction
-        columns = columns.joined(problem.columns(columns.member[ends[which]], new))
-    return columns
+        new = trajectories.log_t[ends[which]] + edge * reach[which] * fraction
+        trajectories = trajectories.joined(problem.trajectories(trajectories.member[ends[which]], new))
+    return trajectories
 
 
-def _deeper(problem: Problem, columns: ScannedFlows) -> NDArray[np.bool_]:
-    """The columns with flows near the largest hold-up that may lead beyond it, to the requested value."""
-    log_m, target = columns.flows[..., LOG_M], problem.target[columns.member, None]
-    left = target - columns.flows[..., problem.which]
+def _deeper(problem: Problem, trajectories: ScannedFlows) -> NDArray[np.bool_]:
+    """The trajectories with flows near the largest hold-up that may lead beyond it, to the requested value."""
+    log_m, target = trajectories.flows[..., LOG_M], problem.target[trajectories.member, None]
+    left = target - trajectories.flows[..., problem.which]
     with np.errstate(invalid="ignore"):
-        at_edge = log_m > problem.deepest[columns.member, None] - _AT_EDGE
+        at_edge = log_m > problem.deepest[trajectories.member, None] - _AT_EDGE
         within_reach = (left > 0.0) & (left < _STEEPEST * (np.log(DEEPEST) - log_m))
     return (at_edge & within_reach).any(axis=1) & (problem.which != LOG_M)
 
 
-def _links(problem: Problem, columns: ScannedFlows) -> tuple[Brackets, Indices, Indices]:
-    """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
-    hide more, and wants a column, and those after which columns do not tell."""
-    left = np.flatnonzero(columns.member[1:] == columns.member[:-1])
+def _links(problem: Problem, trajectories: ScannedFlows) -> tuple[Brackets, Indices, Indices]:
+    """The flows that lie between trajectories that go over into each other, the trajectories after which there is a gap
+    that may hide more, and wants a trajectory, and those after which trajectories do not tell."""
+    left = np.flatnonzero(trajectories.member[1:] == trajectories.member[:-1])
     right = left + 1
-    member = columns.member[left]
-    a, b = columns.flows[left], columns.flows[right]
-    n_a, n_b = columns.count[left], columns.count[right]
-    step = columns.log_t[right] - columns.log_t[left]
+    member = trajectories.member[left]
+    a, b = trajectories.flows[left], trajectories.flows[right]
+    n_a, n_b = trajectories.count[left], trajectories.count[right]
+    step = trajectories.log_t[right] - trajectories.log_t[left]
     apart = _APART + _BY_TEMPERATURE * step
     deepest = problem.deepest[member]
     # From the surface down the flows go over into each other, up to the first that does not.
@@ -231,15 +234,15 @@ def _links(problem: Problem, columns: ScannedFlows) -> tuple[Brackets, Indices, 
     linked = place < first[:, None]
     crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
     split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, step, deepest)
-    turning = _turning(columns, left, linked, off_a, off_b)
+    turning = _turning(trajectories, left, linked, off_a, off_b)
     split |= turning
     rows, places = np.nonzero(crossing)
     log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
     found = Brackets(
         member[rows],
         places,
-        columns.log_t[left[rows]],
-        columns.log_t[right[rows]],
+        trajectories.log_t[left[rows]],
+        trajectories.log_t[right[rows]],
         off_a[rows, places],
         off_b[rows, places],
         log_m,
@@ -258,7 +261,7 @@ def _unlinked(
     step: Array,
     deepest: Array,
 ) -> NDArray[np.bool_]:
-    """Where flows of neighbouring columns that do not go over into each other may hide the requested value."""
+    """Where flows of neighbouring trajectories that do not go over into each other may hide the requested value."""
     apart = _APART + _BY_TEMPERATURE * step
     place = np.arange(_MOST)
     # From below, flows may go over into each other with other places.
@@ -290,13 +293,13 @@ def _unlinked(
 
 
 def _turning(
-    columns: ScannedFlows, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
+    trajectories: ScannedFlows, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
 ) -> NDArray[np.bool_]:
-    """The gaps, after the columns ``left``, in which the quantity may turn along a branch so near to its value that it
-    passes it between columns without a change of sign, or more than once with one."""
-    step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
+    """The gaps, after the trajectories ``left``, in which the quantity may turn along a branch so near to its value
+    that it passes it between trajectories without a change of sign, or more than once with one."""
+    step = (trajectories.log_t[left + 1] - trajectories.log_t[left])[:, None]
     # Of all gaps in order, those between members missing.
-    slope = np.full((columns.member.size - 1, _MOST), np.nan)
+    slope = np.full((trajectories.member.size - 1, _MOST), np.nan)
     slope[left] = np.where(linked, (off_b - off_a) / step, np.nan)
     change = np.abs(np.diff(slope, axis=0, prepend=np.nan, append=np.nan))
     noise = np.ones((len(slope), 1))
@@ -374,7 +377,7 @@ class FlowsInBrackets:
             return flows_on(some, temperature, EventZeros(np.arange(which.size), state, found.trouble))
 
     def rough(self) -> tuple[Array, Array]:
-        """ln T of the flows by rough columns, and the slope of the quantity's logarithm over it in the bracket."""
+        """ln T of the flows by rough trajectories, and the slope of the quantity's logarithm over it in the bracket."""
         b = self._brackets
 
         def off(which: Indices, log_t: Array) -> Array:
@@ -406,5 +409,5 @@ class FlowsInBrackets:
         return log_t, slope, here
 
 
-#: Accuracy of the columns between which a zero is sought.
+#: Accuracy of the trajectories between which a zero is sought.
 _POLISH = Accuracy(1e-7, 2e-3)

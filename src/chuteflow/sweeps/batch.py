@@ -15,7 +15,7 @@ one, nothing else would be gained by tables.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -74,8 +74,10 @@ class Batch:
 
     def take(self, members: Indices) -> Batch:
         """The batch of the chutes ``members``, which may repeat."""
-        arrays = [getattr(self, field.name)[members] for field in fields(self)[2:]]
-        return Batch(self.law, self.surface, *arrays)
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(
+            self, **{name: values[members] for name, values in arrays.items() if isinstance(values, np.ndarray)}
+        )
 
     @property
     def surface_stress(self) -> float:
