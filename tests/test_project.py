@@ -310,7 +310,7 @@ def functions_imported(module: str) -> set[str]:
 def test_pictures_compute_nothing():
     drawn = {module: functions_imported(module) - DRAWING for module in MODULES if layer_of(module) == "plotting"}
     assert {module: found for module, found in drawn.items() if found} == {}
-    assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count"}
+    assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count_flows"}
 
 
 def class_names(sources: dict[str, str]) -> dict[str, list[str]]:

@@ -127,7 +127,7 @@ def test_hot_flows_between_the_printed_bound_and_the_exact_one():
         ({"Q": "three"}, "Q = 'three': must be a number"),
         ({"T_surface": 1e300}, "T_surface = 1e\\+300"),
         ({"Q": 3.0, "tolerance": 1.0}, "tolerance 1: must be"),
-        ({"Q": 3.0, "surface_temperature": (10.0, 1.0)}, "must increase"),
+        ({"Q": 3.0, "surface_temperature": (10.0, 1.0)}, "must rise"),
         ({"Q": 3.0, "largest_holdup": -1.0}, "largest hold-up -1"),
     ],
 )

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, flows
-from chuteflow.branches.paths import Chord, turns
+from chuteflow.branches.paths import Chord, locate_turning_points
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.rough_turns import dips, may_turn
+from chuteflow.branches.rough_turns import find_extrema, may_turn
 from chuteflow.branches.solution_branches import trace_branches
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
@@ -77,7 +77,7 @@ def test_two_folds_far_between_two_flows_are_seen():
     found = [turn for turn in branch.turns(LOG_Q, 1e-10) if turn.point.m[LOG_Q] > np.log(500.0)]
     low, high = (int(turn.place) for turn in found)
     for wide in (1, 2):
-        assert len(turns([every[low - wide], every[high + 1 + wide]], LOG_Q)) == 2
+        assert len(locate_turning_points([every[low - wide], every[high + 1 + wide]], LOG_Q)) == 2
 
 
 @pytest.mark.parametrize(("beyond", "expected"), FOLDS.items())
@@ -159,7 +159,7 @@ def test_turns_that_rounding_makes_are_none():
     chute = Chute(0.4191510618260981, 0.7559395567904552, 0.6770602401681308, 0.5726889224411995)
     (branch,) = branches(chute)
     assert np.ptp(branch.macroscopic[-4:, LOG_T]) < 1e-8
-    assert turns(branch.points[-6:], LOG_T) == []
+    assert locate_turning_points(branch.points[-6:], LOG_T) == []
 
 
 def test_rough_slopes_tell_where_a_quantity_may_turn():
@@ -176,12 +176,12 @@ def test_rough_slopes_tell_where_a_quantity_may_turn():
 
 def test_a_dip_between_two_points_is_seen_with_its_zeros():
     place = np.array([-1.5, -0.7, 0.4, 1.2])
-    (dip,) = dips(place**2 - 0.09, place)
+    (dip,) = find_extrema(place**2 - 0.09, place)
     assert dip.step == 1
     assert dip.value < 0.0
     zeros = [place[1] + share * (place[2] - place[1]) for share in dip.zeros]
     assert zeros == pytest.approx([-0.3, 0.3], abs=0.1)
-    assert [dip.zeros for dip in dips(place**2 + 0.3, place)] == [()]
+    assert [dip.zeros for dip in find_extrema(place**2 + 0.3, place)] == [()]
 
 
 def test_the_centre_of_mass_may_turn_too():

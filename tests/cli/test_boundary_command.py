@@ -96,7 +96,7 @@ def test_a_picture_counts_the_flows_of_every_region(folds):
 
 def test_a_region_whose_places_disagree_has_no_number(folds, monkeypatch):
     counts = iter(range(100))
-    monkeypatch.setattr(diagrams, "count", lambda found, value, quantity: next(counts))
+    monkeypatch.setattr(diagrams, "count_flows", lambda found, value, quantity: next(counts))
     assert texts(plot_boundaries(diagram(folds))) == []
 
 
@@ -119,7 +119,7 @@ def test_nothing_to_draw_is_drawn_with_its_reason(capsys, tmp_path):
         (["--slope", "0.2:0.4", "--e", "0.8", "--ew", "0.8"], "missing --roughness"),
         (["--slope", "0.3", *MATERIAL], "--slope is 0.3: the second parameter takes a range LO:HI"),
         ([*MATERIAL], "--slope is missing: the second parameter takes a range"),
-        (["--slope", "0.4:0.3", *MATERIAL], "the range must increase"),
+        (["--slope", "0.4:0.3", *MATERIAL], "the range must rise"),
         (["--slope", "0.3:x", *MATERIAL], "'0.3:x' is not a range"),
         (["--slope", "0.2:0.4", "--e", "0.7:0.8", "--ew", "0.8", "--roughness", "0.6"], "only --slope takes a range"),
         (["--of", "fold-h", "--slope", "0.2:0.4", *MATERIAL], "fold-h"),

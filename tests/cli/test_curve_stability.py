@@ -69,7 +69,7 @@ def test_files_keep_the_special_points(capsys, tmp_path, ending):
 
 def test_the_picture_is_solid_where_stable_and_dashed_where_not():
     curve = chuteflow.curve(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), points=40, surface_temperature=(0.3, 10.0))
-    figure = plot_marked(along.marked(curve, samples=10))
+    figure = plot_marked(along.mark_stability(curve, samples=10))
     lines = [line for line in figure.axes[0].get_lines() if np.size(line.get_xdata()) > 1]
     assert [line.get_linestyle() for line in lines] == ["--", "-", "--"]
     assert len({line.get_color() for line in lines}) == 3

@@ -142,7 +142,7 @@ def test_the_picture_names_what_is_there(found):
         ([*AXES, *REST[:4], "--temperature", "1,hot"], "not a number"),
         ([*AXES, *REST[:4], "--tolerance", "1"], "tolerance"),
         ([*AXES, *REST[:4], "--plot", "map.gif"], "must end in"),
-        (["--ew", "0.9:0.7", *AXES[2:], *REST], "must increase"),
+        (["--ew", "0.9:0.7", *AXES[2:], *REST], "must rise"),
         (["--ew", "0.7:1.7", *AXES[2:], *REST], "wall restitution"),
     ],
 )

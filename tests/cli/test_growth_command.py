@@ -117,7 +117,7 @@ def test_no_flow_is_an_answer(capsys):
     [
         (f"growth {PAPER} --flux 3 --size 40", "MxN"),
         (f"growth {PAPER} --flux 3 --size 2x2", "size 2x2"),
-        (f"growth {PAPER} --flux 3 --kx 1:0 --ky 0:1", "must increase"),
+        (f"growth {PAPER} --flux 3 --kx 1:0 --ky 0:1", "must rise"),
         (f"growth {PAPER} --flux 3 --kx 1", "LO:HI"),
         (f"growth {PAPER} --flux 3 --flow 9", "choose from 1"),
         (f"growth {PAPER} --flux 3 --kx 0:1 --ky 0:1 --surface interface", "free surface"),

@@ -190,7 +190,7 @@ def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeyp
     def summary(plane, outer, inner):
         return (0, int(band[0] < inner < band[1]), 0, 0, 0)
 
-    monkeypatch.setattr(domains, "summary", summary)
+    monkeypatch.setattr(domains, "summarise", summary)
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4"}
     low, high = queries.CONTROLS["roughness"].low, queries.CONTROLS["roughness"].high
     near = ",".join(f"{low + share * (high - low):.4g}" for share in band)

@@ -8,7 +8,7 @@ import numpy as np
 from chuteflow import Chute, SolveError, curve, flows
 from chuteflow.maps import CODES, ParameterAxis, ParameterPlane
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.plane import code
+from chuteflow.maps.plane import classify
 
 #: Ranges in which nearly all flows are.
 RANGES = {
@@ -65,7 +65,7 @@ def compare(seed, count, tolerance, surface="free"):
     for _ in range(count):
         plane, (u, v) = next(points)
         chute = plane.chute_at(u, v)
-        mapped = code(plane, u, v)
+        mapped = classify(plane, u, v)
         try:
             solved = enumerated(chute)
         except SolveError as error:
@@ -75,7 +75,7 @@ def compare(seed, count, tolerance, surface="free"):
         if not differ:
             continue
         around = [
-            code(plane, u + a * share * tolerance, v + b * share * tolerance)
+            classify(plane, u + a * share * tolerance, v + b * share * tolerance)
             for share in (1.0, 0.5)
             for a in (-1, 0, 1)
             for b in (-1, 0, 1)

@@ -7,9 +7,9 @@ from chuteflow import Chute, InputError, curve, domain, flows, hot
 from chuteflow.branches.counting import flux_counts, most_at_once
 from chuteflow.maps import CODES, exists_at
 from chuteflow.maps.columns import PiecewiseConstant, alike
-from chuteflow.maps.kinds import _monotonic_pieces, kinds
-from chuteflow.maps.plane import ParameterAxis, ParameterPlane, code
-from chuteflow.maps.zeros import extremes_on, zeros_on
+from chuteflow.maps.kinds import _monotonic_pieces, classify_flows
+from chuteflow.maps.plane import ParameterAxis, ParameterPlane, classify
+from chuteflow.maps.zeros import bound_extremes, evaluate_zeros
 from chuteflow.steady.model import model
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
@@ -96,7 +96,7 @@ def test_what_deep_trajectories_show_by_interpolation_alone_is_no_kind(seed, slo
     plane, place = next(
         point for point in random_planes(seed) if point[0].chute_at(*point[1]).slope == pytest.approx(slope, rel=1e-12)
     )
-    assert code(plane, *place) == enumerated(plane.chute_at(*place))
+    assert classify(plane, *place) == enumerated(plane.chute_at(*place))
 
 
 @pytest.mark.slow
@@ -115,10 +115,10 @@ def test_cells_are_those_of_their_centres(base_map):
     for _ in range(60):
         j, i = int(random.integers(len(base_map.y))), int(random.integers(len(base_map.x)))
         u, v = (i + 0.5) / len(base_map.x), (j + 0.5) / len(base_map.y)
-        found = code(plane, u, v)
+        found = classify(plane, u, v)
         said = (base_map.most[j, i], base_map.families[j, i])
         if said != found[:2]:
-            around = [code(plane, u + a * 0.01, v + b * 0.01)[:2] for a in (-1, 0, 1) for b in (-1, 0, 1)]
+            around = [classify(plane, u + a * 0.01, v + b * 0.01)[:2] for a in (-1, 0, 1) for b in (-1, 0, 1)]
             assert said in around
             wrong += 1
     assert wrong < 6
@@ -141,7 +141,7 @@ def test_boundaries_part_what_differs(base_map):
             beside = [(u + s * across[0], v + s * across[1]) for s in (-1.0, 1.0)]
             if not all(0.0 <= share <= 1.0 for point in beside for share in point):
                 continue
-            sides = [code(plane, *point)[number] for point in beside]
+            sides = [classify(plane, *point)[number] for point in beside]
             assert sides[0] != sides[1]
             checked += 1
     assert checked > 20
@@ -221,7 +221,7 @@ def test_a_fold_of_the_curve_is_where_the_number_of_flows_changes(base_map):
     for y in base_map.y[::4]:
         folds = [p for branch in curve(Chute(0.3, 0.8, wall, float(y))).branches for p in branch.special]
         counts.append(sum(point.kind == "fold-Q" for point in folds))
-    mapped = [code(base_map.plane, u, float((y - 0.5) / (base_map.plane.y.high - 0.5)))[0] for y in base_map.y[::4]]
+    mapped = [classify(base_map.plane, u, float((y - 0.5) / (base_map.plane.y.high - 0.5)))[0] for y in base_map.y[::4]]
     assert [count >= 2 for count in counts] == [most >= 3 for most in mapped]
 
 
@@ -242,7 +242,7 @@ def test_bands_narrower_than_can_be_resolved_are_left_out():
         ({"workers": 0}, "workers"),
         ({"y": ("slope", 0.1, 0.2)}, "both axes"),
         ({"y": ("roughness", 0.1, 0.6)}, "roughness"),
-        ({"y": ("roughness", 0.6, 0.5)}, "must increase"),
+        ({"y": ("roughness", 0.6, 0.5)}, "must rise"),
         ({"y": ("rough", 0.5, 0.6)}, "unknown parameter"),
         ({"largest_holdup": -1.0}, "hold-up"),
     ],
@@ -277,7 +277,7 @@ def test_scatter_of_deep_flows_makes_no_folds(slope, roughness, most):
     plane = ParameterPlane(
         ParameterAxis("slope", 0.25, 0.45), ParameterAxis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ()
     )
-    found = code(plane, (slope - 0.25) / 0.2, (roughness - 0.5) / 0.36)
+    found = classify(plane, (slope - 0.25) / 0.2, (roughness - 0.5) / 0.36)
     assert found[CODES.index("most")] == most
     solved = curve(Chute(slope, 0.8, 0.8, roughness), points=10)
     assert max(count.flows for count in flux_counts(solved)) == most
@@ -288,14 +288,14 @@ def test_the_first_inverted_flow_is_where_the_density_at_its_base_first_rises():
         ParameterAxis("slope", 0.25, 0.45), ParameterAxis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ()
     )
     # By curves of 300 points it is at r = 0.76589.
-    mapped = [code(plane, 0.465, (r - 0.5) / 0.36)[CODES.index("inverted")] for r in (0.7654, 0.7664)]
+    mapped = [classify(plane, 0.465, (r - 0.5) / 0.36)[CODES.index("inverted")] for r in (0.7654, 0.7664)]
     assert mapped == [1, 0]
 
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():
     chute = Chute(0.38750000000000007, 0.7901041666666666, 0.8, 0.6)
     grid = integrate_trajectories(model(chute), 1e-3, 1e5, 30.0)
-    zeros = zeros_on(grid, extremes_on(grid))
+    zeros = evaluate_zeros(grid, bound_extremes(grid))
     assert np.isfinite([zeros.log_q, zeros.log_m, zeros.log_t, zeros.rise]).all()
 
 
@@ -310,8 +310,8 @@ def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface
     )
     for u, v in np.random.default_rng(3).uniform(size=(6, 2)):
         grid = integrate_trajectories(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
-        alone = kinds(grid, extremes_on(grid), ())
-        assert code(plane, u, v)[:2] == (alone.most, alone.families)
+        alone = classify_flows(grid, bound_extremes(grid), ())
+        assert classify(plane, u, v)[:2] == (alone.most, alone.families)
 
 
 @pytest.mark.parametrize(
@@ -324,5 +324,5 @@ def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface
 )
 def test_deep_families_of_steep_chutes_are_those_that_are_solved(chute, expected):
     plane = ParameterPlane(ParameterAxis("slope", 0.1, 0.6), ParameterAxis("roughness", 0.5, 0.866), chute, ())
-    found = code(plane, (chute.slope - 0.1) / 0.5, (chute.roughness - 0.5) / 0.366)
+    found = classify(plane, (chute.slope - 0.1) / 0.5, (chute.roughness - 0.5) / 0.366)
     assert found[:2] == expected

@@ -17,7 +17,7 @@ from chuteflow.plotting.axes import drawn
 from chuteflow.plotting.closure_plot import plot_comparison, plot_laws
 from chuteflow.plotting.sensitivity_plot import plot_sensitivities
 from chuteflow.plotting.stability_curve import plot_marked
-from chuteflow.stability.along import marked
+from chuteflow.stability.along import mark_stability
 from chuteflow.theory.laws import LAWS
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
@@ -71,7 +71,7 @@ SLOW = {
     "neutral": lambda: drawn(chuteflow.neutral(PAPER, size=(8, 8)), None),
     "stability": lambda: drawn(chuteflow.stability_of(paper_flows()[2]), None),
     "stability in SI": lambda: drawn(chuteflow.stability_of(paper_flows()[0]), SI),
-    "stability along a curve": lambda: plot_marked(marked(chuteflow.curve(PAPER, points=8))),
+    "stability along a curve": lambda: plot_marked(mark_stability(chuteflow.curve(PAPER, points=8))),
     "relaxation": lambda: drawn(chuteflow.relax(paper_flows()[1], duration=20.0), SI),
     "boundaries": lambda: drawn(diagram(chuteflow.boundary(PAPER, bounds=(0.25, 0.38))), None),
     "laws compared": lambda: plot_comparison(

@@ -6,7 +6,7 @@ import numpy as np
 
 import chuteflow
 from chuteflow.numerics.chebyshev import grid
-from chuteflow.numerics.eigenproblem import refined
+from chuteflow.numerics.eigenproblem import refine_eigenvalue
 from chuteflow.stability.base import BaseState, Resolution
 from chuteflow.stability.linear import operator
 from chuteflow.stability.modes import Mode
@@ -45,4 +45,4 @@ def rational_base(flow: chuteflow.Flow, degree: int, reach: float, crowding: flo
 def seen_again(mode: Mode, degree: int = 90, crowding: float = 2.0) -> float:
     """Change of the rate of ``mode`` on the other map."""
     other = operator(rational_base(mode.flow, degree, mode.operator.base.resolution.reach + 1.0, crowding))
-    return abs(refined(other.matrix(mode.kx, mode.ky), other.weights, mode.sigma)[0] - mode.sigma)
+    return abs(refine_eigenvalue(other.matrix(mode.kx, mode.ky), other.weights, mode.sigma)[0] - mode.sigma)

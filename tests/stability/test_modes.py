@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import chuteflow
-from chuteflow.numerics.eigenproblem import drift, refined, spectrum
+from chuteflow.numerics.eigenproblem import drift, refine_eigenvalue, spectrum
 from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import operator, without_top
 from chuteflow.stability.modes import Disturbances, relative_fields
@@ -198,7 +198,7 @@ def test_no_error_is_understated(three, disturbances, name):
     fine = operator(base(three[name], Resolution(112, 19.0, 4.0)))
     for kx, ky in ((1e-3 / h, 0.0), (0.03 / h, 0.0), (0.0, 0.05 / h), (0.5 / h, 0.5 / h), (2.0 / h, 0.0)):
         for mode in leading(disturbances[name], kx, ky, count=2):
-            sigma, _ = refined(fine.matrix(kx, ky), fine.weights, mode.sigma)
+            sigma, _ = refine_eigenvalue(fine.matrix(kx, ky), fine.weights, mode.sigma)
             assert abs(sigma - mode.sigma) < 2.0 * mode.error
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from chuteflow import Chute, curve, flows
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
-from chuteflow.sweeps.at_quantity import at_quantity
+from chuteflow.sweeps.at_quantity import solve_at_quantity
 from chuteflow.sweeps.batch import Batch
 
 #: Chutes at centres of mass that two flows share, near a turn of h that lies between two columns.
@@ -18,7 +18,7 @@ PAIRS = [
 def swept(parameters, which, values):
     columns = np.array(parameters, dtype=float).reshape(-1, 4).T
     batch = Batch.of("lun", "free", *columns)
-    found, unsettled = at_quantity(batch, which, np.array(values, dtype=float), (1e-3, 1e5), 30.0, 1e-10)
+    found, unsettled = solve_at_quantity(batch, which, np.array(values, dtype=float), (1e-3, 1e5), 30.0, 1e-10)
     return np.bincount(found.member, minlength=len(batch)), unsettled, found
 
 

@@ -236,7 +236,7 @@ def test_a_law_that_loses_its_meaning_is_told(monkeypatch):
 
 def broken_at(slope):
     """The engine of given surface temperatures, broken by one chute."""
-    sound = engine.at_temperature
+    sound = engine.solve_at_temperature
 
     def broken(batch, *others):
         if (batch.slope == slope).any():
@@ -253,7 +253,7 @@ def slopes_study():
 
 def test_a_chute_that_breaks_its_batch_is_solved_alone(monkeypatch):
     sound = solve_chunk(slopes_study(), 0)
-    monkeypatch.setattr(engine, "at_temperature", broken_at(0.31))
+    monkeypatch.setattr(engine, "solve_at_temperature", broken_at(0.31))
     chunk = solve_chunk(slopes_study(), 0)
     assert chunk.singly == 1
     assert not chunk.failures
@@ -268,7 +268,7 @@ def test_a_chute_that_cannot_be_solved_at_all_is_told(monkeypatch):
     def given_up(*_, **__):
         raise SolveError("given up on purpose")
 
-    monkeypatch.setattr(engine, "at_temperature", broken_at(0.31))
+    monkeypatch.setattr(engine, "solve_at_temperature", broken_at(0.31))
     monkeypatch.setattr(engine, "flows_within", given_up)
     chunk = solve_chunk(slopes_study(), 0)
     assert chunk.status.tolist() == [0, 0, 0, PointStatus.FAILED, 0]

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.solution_branches import doubt
+from chuteflow.branches.solution_branches import explain_incompleteness
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
@@ -181,6 +181,6 @@ def test_a_cell_too_short_to_be_divided_in_which_the_residual_turns_to_zero_is_u
     assert coarse.hidden.shape == (len(coarse.undecided), 4)
     assert (coarse.hidden[:, 2] <= np.log(25.0) + 1e-9).all()
     assert fine.cells > coarse.cells > 1000
-    left = doubt(coarse, SearchRange(1e-3, 1e5, 25.0, 0.0), [], ("a flow", "flows"))
+    left = explain_incompleteness(coarse, SearchRange(1e-3, 1e5, 25.0, 0.0), [], ("a flow", "flows"))
     assert left is not None
     assert "does not tell flows apart near M = " in left

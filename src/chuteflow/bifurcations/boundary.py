@@ -14,7 +14,7 @@ from chuteflow import display
 from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
 from chuteflow.bifurcations.system import SecondParameter
-from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
+from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import LineOfFlows, Searched
 from chuteflow.branches.solution_branches import TracedBranch
@@ -230,7 +230,7 @@ def boundary(
             inside = within.contains(point.flow.solution.macroscopic)
             if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", fraction)
-                line = traced(point, within, tolerance, control, notice)
+                line = trace_boundary(point, within, tolerance, control, notice)
                 # A point that could not be distinguished from those of a known line has led to it again.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]
@@ -246,13 +246,13 @@ def boundary(
             continue
         sampled.append(value)
         entered.append(tuple(branches))
-        for condition in starting_points.conditions(of):
-            follow(starting_points.on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
-    for condition in starting_points.conditions(of):
+        for condition in starting_points.make_test_functions(of):
+            follow(starting_points.find_on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
+    for condition in starting_points.make_test_functions(of):
         for low, high in pairwise(values):
-            for value in starting_points.whatever_the_flow(sweep, condition, low, high):
-                branches = starting_points.branches_at(sweep, value, within)
-                follow(starting_points.along_branches(sweep, condition, value, branches, tolerance), 1.0)
+            for value in starting_points.find_values_for_all_flows(sweep, condition, low, high):
+                branches = starting_points.trace_branches_at(sweep, value, within)
+                follow(starting_points.find_along_branches(sweep, condition, value, branches, tolerance), 1.0)
     boundaries = sorted((as_boundary(of, second, b) for b in found), key=lambda b: -len(b.flows))
     return BoundarySet(
         chute=chute,
@@ -281,7 +281,7 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
         if end.surface == "free":
             require_limit(end.law, end.restitution, end.slope, "boundaries need")
     if not low < high:
-        raise InputError(f"{second} from {low:g} to {high:g}: the range must increase")
+        raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")
     return sweep
 
 
@@ -292,7 +292,7 @@ def _branches_at(
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))
         try:
-            return starting_points.branches_at(sweep, beside, within), beside
+            return starting_points.trace_branches_at(sweep, beside, within), beside
         except SolveError:
             continue
     return None, value

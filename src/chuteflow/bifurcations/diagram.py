@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet
-from chuteflow.bifurcations.regions import count, limits, sides
+from chuteflow.bifurcations.regions import count_flows, find_kinds_beside, find_range_edges
 from chuteflow.bifurcations.starting_points import FOLDS
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.quantities import PLACE
@@ -101,7 +101,7 @@ def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
     """
     lines = [(boundary.parameter, getattr(boundary, quantity)) for boundary in found]
     frame = DiagramFrame.around(*(np.concatenate(part) for part in zip(*lines, strict=True)), bounds=found.bounds)
-    edges = limits(found) if FOLDS.get(found.kind) == PLACE.index(quantity) else []
+    edges = find_range_edges(found) if FOLDS.get(found.kind) == PLACE.index(quantity) else []
     lines += [(edge.parameter, getattr(edge, quantity)) for edge in edges]
     regions = _regions(found, frame, lines) if edges else ()
     return Diagram(found, quantity, frame, tuple(edges), tuple(regions), tuple(_sides(found, frame, quantity)))
@@ -132,8 +132,8 @@ def _regions(found: BoundarySet, frame: DiagramFrame, lines: Sequence[tuple[Arra
         away = np.hypot(*(np.indices(depth.shape) - np.reshape(place, (2, 1, 1))))
         other = np.unravel_index(int(np.argmax(away * (depth >= 0.5 * _FITTING))), depth.shape)
         here, there = (frame.point(*_middle(cell)) for cell in (place, other))
-        counted = count(found, *here)
-        if counted == count(found, *there):
+        counted = count_flows(found, *here)
+        if counted == count_flows(found, *there):
             yield CountedRegion(*here, counted)
 
 
@@ -158,6 +158,6 @@ def _sides(found: BoundarySet, frame: DiagramFrame, quantity: str) -> Iterator[K
         places = frame.fractions(boundary.parameter, getattr(boundary, quantity)) * (1.0, _ASPECT)
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
         index = int(np.clip(np.searchsorted(length, _FRACTION * length[-1]), 1, len(length) - 2))
-        kinds = sides(boundary, PLACE.index(quantity), index)
+        kinds = find_kinds_beside(boundary, PLACE.index(quantity), index)
         if kinds is not None:
             yield KindsBeside(boundary, index, kinds)

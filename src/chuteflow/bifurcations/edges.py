@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from chuteflow.bifurcations.points import BoundaryPoint, solved
+from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
 from chuteflow.bifurcations.system import BoundarySystem
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.numerics.chebyshev import Array
@@ -22,7 +22,7 @@ _REACHED, _ADJUSTED = 1e-12, 4
 _LEADING = ((2, 1.0), (2, -1.0), (0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))
 
 
-def left(
+def find_exit(
     before: CurvePoint[BoundarySystem], point: CurvePoint[BoundarySystem], within: SearchRange, tolerance: float
 ) -> tuple[BoundaryPoint | None, str] | None:
     """The point at which a step leaves the range, if it is not the one before, and in words how; None inside.
@@ -42,13 +42,13 @@ def left(
     unknown, sign = _LEADING[edge]
     start = before.z + fraction * (point.z - before.z)
     target = float(start[unknown - 3])
-    there = solved(point.system, start, np.eye(3)[unknown], target, tolerance)
+    there = solve_boundary_point(point.system, start, np.eye(3)[unknown], target, tolerance)
     for _ in range(_ADJUSTED):
         off = float(_excesses(there.system, there.w, within)[edge])
         if abs(off) < _REACHED:
             break
         target -= sign * off
-        there = solved(point.system, start, np.eye(3)[unknown], target, tolerance)
+        there = solve_boundary_point(point.system, start, np.eye(3)[unknown], target, tolerance)
     return there, words
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
 from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
-from chuteflow.bifurcations.points import BoundaryPoint, solved
+from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
 from chuteflow.bifurcations.starting_points import FOLDS, HELD
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
-from chuteflow.bifurcations.tracing import TracedBoundary, traced
+from chuteflow.bifurcations.tracing import TracedBoundary, trace_boundary
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.solution_branches import TracedBranch
@@ -32,7 +32,7 @@ _AT_EDGE = 1e-6
 _BEYOND = 10.0
 
 
-def count(found: BoundarySet, value: float, quantity: float) -> int:
+def count_flows(found: BoundarySet, value: float, quantity: float) -> int:
     """How many flows there are in the range searched at a ``value`` of the second parameter, which share one value
     of the quantity whose folds ``found`` are.
 
@@ -52,7 +52,7 @@ def count(found: BoundarySet, value: float, quantity: float) -> int:
     return len(flows(chute, **which, **ranges))
 
 
-def limits(found: BoundarySet) -> list[Boundary]:
+def find_range_edges(found: BoundarySet) -> list[Boundary]:
     """The edges of the range searched, as far as branches of flows end there: the flows of the largest and smallest
     surface temperature and of the largest hold-up, followed through the second parameter.
 
@@ -73,9 +73,9 @@ def limits(found: BoundarySet) -> list[Boundary]:
             for solution in _ends(branches, condition):
                 w = np.append(solution.z, value)
                 system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-                point = solved(system, w, HELD, value, found.tolerance)
+                point = solve_boundary_point(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
-                    lines.append(traced(point, wider, found.tolerance))
+                    lines.append(trace_boundary(point, wider, found.tolerance))
         out += [as_boundary("limit", found.second, line) for line in lines]
     return out
 
@@ -87,7 +87,7 @@ def _ends(branches: tuple[TracedBranch, ...], condition: FixedQuantity) -> Itera
                 yield solution
 
 
-def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
+def find_kinds_beside(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     """The kinds of the flows at smaller and at larger values of the second parameter, beside point ``index`` of a
     boundary, with the quantity ``which`` held; None for folds, and where that quantity has a fold itself."""
     point: BoundaryPoint = boundary.traced.points[index]

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, Linearisation, TestFunction
-from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
+from chuteflow.bifurcations.points import BoundaryPoint, estimate_shift, solve_across, solve_boundary_point
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.paths import solve_between
 from chuteflow.branches.ranges import SearchRange
@@ -25,7 +25,7 @@ from chuteflow.branches.solution_branches import TracedBranch, trace_branches
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition, Solution, resolve
@@ -71,14 +71,14 @@ class _SampledFlow:
         return float(self.gradient @ solve_each(matrix, side))
 
 
-def conditions(kind: str) -> Sequence[TestFunction]:
+def make_test_functions(kind: str) -> Sequence[TestFunction]:
     """The conditions of a kind of boundary."""
     if kind in FOLDS:
         return [Fold(FOLDS[kind])]
     return [Inversion()] if kind == "density-inversion" else [InteriorChange(False), InteriorChange(True)]
 
 
-def on_branches(
+def find_on_branches(
     sweep: SecondParameter,
     condition: TestFunction,
     value: float,
@@ -107,7 +107,7 @@ def _in_one_piece(branch: TracedBranch) -> list[Solution]:
     return [solution for solution in branch.solutions if solution.problem.breaks == WHOLE]
 
 
-def branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
+def trace_branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
     """Every branch of flows in a range at one value of the parameter."""
     return trace_branches(model(sweep.chute_at(value)), within)
 
@@ -118,7 +118,7 @@ def _from_flow(
     """The point of the boundary at a value of the parameter, from its flow."""
     w = np.append(solution.z, value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-    return solved(system, w, HELD, value, tolerance)
+    return solve_boundary_point(system, w, HELD, value, tolerance)
 
 
 def _zeros(
@@ -190,7 +190,7 @@ def _near(
     w = np.append(one.z + fraction * (moved - one.z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
-        point = solved(system, w, HELD, value, tolerance)
+        point = solve_boundary_point(system, w, HELD, value, tolerance)
     except SolveError:
         return None
     ends = np.array([s.solution.macroscopic[LOG_M:] for s in (first, last)])
@@ -237,7 +237,7 @@ def _beside(
     for _ in range(_MOST_STEPS):
         w = np.append(solution.z, at)
         system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-        ahead = at + shift(system, w, row)
+        ahead = at + estimate_shift(system, w, row)
         if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
             return None
         if abs(ahead - at) <= _ARRIVED * reach:
@@ -250,7 +250,7 @@ def _beside(
     else:
         return None
     try:
-        point = solved(system, w, row, float(row @ w[-3:]), tolerance)
+        point = solve_boundary_point(system, w, row, float(row @ w[-3:]), tolerance)
     except SolveError:
         return None
     near = abs(point.value - value) <= _FARTHER * reach and sweep.low <= point.value <= sweep.high
@@ -270,7 +270,7 @@ def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solut
     return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
 
-def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
+def find_values_for_all_flows(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
     """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole branches.
 
     On the half-line dissipation and production balance at the surface, or at the density where they come nearest
@@ -283,11 +283,11 @@ def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: floa
         ends = balance(sweep, low), balance(sweep, high)
         if (ends[0] > 0.0) != (ends[1] > 0.0):
             sign = 1.0 if ends[1] > 0.0 else -1.0
-            out.append(bisected(lambda value, sign=sign, of=balance: sign * of(sweep, value), low, high, _CLOSE))
+            out.append(bisect(lambda value, sign=sign, of=balance: sign * of(sweep, value), low, high, _CLOSE))
     return out
 
 
-def along_branches(
+def find_along_branches(
     sweep: SecondParameter, condition: TestFunction, value: float, branches: Sequence[TracedBranch], tolerance: float
 ) -> Iterator[BoundaryPoint]:
     """One point of each stretch of the branches of flows at a value of the parameter that is boundary throughout."""
@@ -299,7 +299,7 @@ def along_branches(
             solution = samples[(begin + end) // 2].solution
             w = np.append(solution.z, value)
             system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-            yield through(system, w, tolerance)
+            yield solve_across(system, w, tolerance)
 
 
 def _at_surface(sweep: SecondParameter, value: float) -> float:

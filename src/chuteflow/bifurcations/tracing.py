@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
-from chuteflow.bifurcations.edges import left
-from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
+from chuteflow.bifurcations.edges import find_exit
+from chuteflow.bifurcations.points import BoundaryPoint, make_point, refine_grid, solve_boundary_point
 from chuteflow.bifurcations.starting_points import HELD
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.ranges import SearchRange
@@ -92,7 +92,7 @@ class TracedBoundary:
             one, other = stops[i][1], stops[i + 1][1]
             fraction = off[i] / (off[i] - off[i + 1])
             w = one.w + fraction * (_carried(other.w, other.system, one.system) - one.w)
-            out.append(solved(one.system, w, HELD, value, tolerance))
+            out.append(solve_boundary_point(one.system, w, HELD, value, tolerance))
         return out
 
     def _meets(self, i: int, sigma: float, point: BoundaryPoint, close: bool) -> bool:
@@ -101,7 +101,7 @@ class TracedBoundary:
         system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
-            there = solved(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
+            there = solve_boundary_point(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
         except SolveError:
             return close
         gap = there.flow.solution.macroscopic - point.flow.solution.macroscopic
@@ -111,7 +111,7 @@ class TracedBoundary:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)
 
 
-def traced(
+def trace_boundary(
     start: BoundaryPoint,
     within: SearchRange,
     tolerance: float,
@@ -174,7 +174,7 @@ def _extend(
     Raises:
         SolveError: where a point or turning point could not be solved to ``tolerance``.
     """
-    edge = left(before, point, within, tolerance)
+    edge = find_exit(before, point, within, tolerance)
     if edge is not None:
         reached, end = edge
         if reached is not None:
@@ -187,7 +187,7 @@ def _extend(
         side.stop("the boundary closes on itself", closed=True)
         return
     row = (point.system.weights * point.tangent)[-3:]
-    side.add(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
+    side.add(solve_boundary_point(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
 
 
 def _add_turn(
@@ -215,8 +215,8 @@ def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], toleranc
     before, settled = np.full(3, np.inf), np.inf
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
         if degree > a.system.degree:
-            system, w = finer(a.system, a.z, degree)
-            a, b = _corrected(system, w, a), _corrected(system, finer(b.system, b.z, degree)[1], b)
+            system, w = refine_grid(a.system, a.z, degree)
+            a, b = _corrected(system, w, a), _corrected(system, refine_grid(b.system, b.z, degree)[1], b)
         if a.tangent[-1] * b.tangent[-1] >= 0.0:
             raise SolveError("a turning point of a boundary is not there on a finer grid")
         located = locate(a, b, a.system, lambda z, tangent, system: float(tangent[-1]))
@@ -228,7 +228,7 @@ def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], toleranc
         scattered = settled < _BLUNT and change > 0.5 * settled
         error = max(change, located.error, settled if scattered else 0.0)
         if scattered or change < max(tolerance, located.error):
-            return as_point(a.system, located.point.z, error)
+            return make_point(a.system, located.point.z, error)
         before, settled = place, change
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 

@@ -11,12 +11,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from chuteflow.branches.existence import imbalance
+from chuteflow.branches.existence import explain_imbalance
 from chuteflow.branches.paths import Chord, PathPoint, find_zero
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
-from chuteflow.branches.rough_turns import dips
-from chuteflow.branches.solution_branches import TracedBranch, doubt, search, searched, trace_all
+from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.branches.solution_branches import (
+    TracedBranch,
+    describe_search,
+    explain_incompleteness,
+    search_range,
+    trace_all,
+)
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
@@ -68,7 +74,7 @@ def curve(
     within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
     found, lost = trace_all(problem, within, tolerance)
-    grid = search(problem, within)
+    grid = search_range(problem, within)
     longest = max((float(branch.arclength[-1]) for branch in found), default=1.0)
     doubts: list[str] = []
     branches = [
@@ -79,10 +85,10 @@ def curve(
     return Curve(
         chute=chute,
         branches=tuple(branches),
-        searched=searched(within, grid),
+        searched=describe_search(within, grid),
         tolerance=tolerance,
-        reason=None if branches else imbalance(problem),
-        incomplete=next(iter(doubts), None) or doubt(grid, within, lost, ("a branch", "branches")),
+        reason=None if branches else explain_imbalance(problem),
+        incomplete=next(iter(doubts), None) or explain_incompleteness(grid, within, lost, ("a branch", "branches")),
     )
 
 
@@ -135,7 +141,7 @@ def _changes(chute: Chute, branch: TracedBranch, tolerance: float) -> Iterator[t
         # The slopes are rough: what comes as near to zero as half of its way there is examined.
         ways = {
             d.step: d
-            for d in dips(values, at)
+            for d in find_extrema(values, at)
             if abs(d.value) < 0.5 * max(np.abs(values[d.step : d.step + 2])) or d.zeros
         }
         for i in range(len(points) - 1):

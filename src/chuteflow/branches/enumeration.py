@@ -12,10 +12,17 @@ from typing import Any, TypeAlias, overload
 
 import numpy as np
 
-from chuteflow.branches.existence import reason_for_none
+from chuteflow.branches.existence import explain_none_found
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import FlowSet, FlowSets
-from chuteflow.branches.solution_branches import SolutionBranch, crossings, doubt, find_branches, search, searched
+from chuteflow.branches.solution_branches import (
+    SolutionBranch,
+    describe_search,
+    explain_incompleteness,
+    find_branches,
+    search_range,
+    solve_crossings,
+)
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -101,13 +108,13 @@ def flows(
     named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
     within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     if not named or np.ndim(named[0][1]) == 0:
-        return flows_within(chute, *asked(given), tolerance, within)
+        return flows_within(chute, *check_condition(given), tolerance, within)
     name, several = named[0]
     values = real_array(name, several)
     if values.ndim > 1:
         raise InputError(f"{name}: must be a number or a one-dimensional array of some")
     each = [{**given, name: value} for value in values.tolist()]
-    sets = tuple(flows_within(chute, *asked(one), tolerance, within) for one in each)
+    sets = tuple(flows_within(chute, *check_condition(one), tolerance, within) for one in each)
     return FlowSets(chute, name, tuple(values.tolist()), sets)
 
 
@@ -131,11 +138,11 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
-        searched=searched(found.within, found.grid),
+        searched=describe_search(found.within, found.grid),
         tolerance=tolerance,
         reason=None
         if found.solutions
-        else reason_for_none(problem, [f.macroscopic for f in found.branches], which, value, found.within),
+        else explain_none_found(problem, [f.macroscopic for f in found.branches], which, value, found.within),
         incomplete=_left_out(found, which, value),
     )
 
@@ -158,15 +165,15 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
     solutions: list[Solution] = []
     lost: list[Array] = []
     for branch in found:
-        solved, missed = crossings(branch, which, value, tolerance)
+        solved, missed = solve_crossings(branch, which, value, tolerance)
         solutions += solved
         lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _BranchSearch(within, found, inside, beyond, lost, search(problem, within))
+    return _BranchSearch(within, found, inside, beyond, lost, search_range(problem, within))
 
 
-def asked(given: Mapping[str, Any]) -> tuple[int, float]:
+def check_condition(given: Mapping[str, Any]) -> tuple[int, float]:
     """The place of the one quantity that is given among the macroscopic ones, and its value.
 
     Raises:
@@ -207,7 +214,7 @@ def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapo
 
 def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = doubt(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
+    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
     if left is not None:
         return left
     for lead in _leads(found, which, value):

@@ -19,17 +19,17 @@ _NAMES = ("Q", "h", "M", "T_surface")
 _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
 
 
-def reason_for_none(model: Model, branches: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
+def explain_none_found(model: Model, branches: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
     """One sentence on why no flow was found, given the quantities (k, 4) of the branches that were."""
     if branches:
         spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in branches]
         ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
         return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"
-    return f"{imbalance(model)} ({_searched(within)})"
+    return f"{explain_imbalance(model)} ({_searched(within)})"
 
 
-def imbalance(model: Model) -> str:
+def explain_imbalance(model: Model) -> str:
     """What keeps energy from balancing on a chute without flows."""
     chute = model.chute
     f, _ = model.closures(_DENSITIES)

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chuteflow import display
-from chuteflow.branches.enumeration import asked, flows_within
+from chuteflow.branches.enumeration import check_condition, flows_within
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.solution_branches import find_branches, search
+from chuteflow.branches.solution_branches import find_branches, search_range
 from chuteflow.errors import ChuteflowError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE, Parameter
@@ -92,7 +92,7 @@ def nearest(
     quantity = near = None
     if condition:
         (quantity,) = condition
-        which, value = asked(given)
+        which, value = check_condition(given)
         looked_for = _Target(within.restricted(which, value), which, value)
         near = _nearest_value(chute, which, value, within)
     found: dict[str, float | None] = {}
@@ -127,7 +127,7 @@ class _Target:
     def cells(self, chute: Chute) -> int:
         """How many cells the search of ``chute`` looked at."""
         try:
-            return search(model(chute), self.within).cells
+            return search_range(model(chute), self.within).cells
         except ChuteflowError:
             return 0
 

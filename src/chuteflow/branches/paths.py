@@ -56,7 +56,7 @@ class PathPoint:
         return PathPoint(self.solution, -self.tangent)
 
 
-def point_at(start: Elements, weights: Array, value: float, tolerance: float) -> PathPoint | None:
+def solve_point(start: Elements, weights: Array, value: float, tolerance: float) -> PathPoint | None:
     """The point near ``start`` whose quantities, times ``weights`` (4,), sum to ``value``; its tangent goes along them.
 
     None where Newton's method finds none.
@@ -72,7 +72,7 @@ def _point_between(first: Solution, last: Solution, sigma: float, tolerance: flo
     chord = last.macroscopic - first.macroscopic
     direction = chord / np.linalg.norm(chord)
     value = float(direction @ (first.macroscopic + sigma * chord))
-    return point_at(between(first, last, sigma), direction, value, tolerance)
+    return solve_point(between(first, last, sigma), direction, value, tolerance)
 
 
 def solve_between(first: Solution, last: Solution, fraction: float, tolerance: float = TOLERANCE) -> Solution:
@@ -148,7 +148,7 @@ class Chord:
         return self.slope(point) if found is None else found * self.length
 
 
-def refined(points: Sequence[PathPoint], tolerance: float = TOLERANCE) -> list[PathPoint]:
+def refine_path(points: Sequence[PathPoint], tolerance: float = TOLERANCE) -> list[PathPoint]:
     """The points with as many between them as it takes for each chord to suffice.
 
     Raises:
@@ -183,7 +183,7 @@ def _halfway(chord: Chord) -> PathPoint:
             aside /= width
             start = between(chord.first.solution, chord.last.solution, 0.5)
             value = 0.5 * float(aside @ (chord.first.m + chord.last.m))
-            point = point_at(start, aside, value, chord.tolerance)
+            point = solve_point(start, aside, value, chord.tolerance)
             if point is not None:
                 return point
     for sigma in (0.5, 0.25, 0.75):
@@ -202,7 +202,7 @@ class TurningPoint:
     point: PathPoint
 
 
-def turns(points: Sequence[PathPoint], which: int, tolerance: float = TOLERANCE) -> list[TurningPoint]:
+def locate_turning_points(points: Sequence[PathPoint], which: int, tolerance: float = TOLERANCE) -> list[TurningPoint]:
     """The points at which a quantity turns along successive ``points`` that suffice, in order.
 
     Its slope is known exactly at the points. Between two it is a quadratic of them and of the quantity's change, and

@@ -69,7 +69,7 @@ class SearchRange:
         largest_holdup = number("largest_holdup", largest_holdup)
         if not WIDEST[0] <= low < high <= WIDEST[1]:
             raise InputError(
-                f"surface temperatures from {low:g} to {high:g}: must increase, within {WIDEST[0]:g} to {WIDEST[1]:g}"
+                f"surface temperatures from {low:g} to {high:g}: must rise, within {WIDEST[0]:g} to {WIDEST[1]:g}"
             )
         if not SHALLOWEST <= largest_holdup <= DEEPEST:
             raise InputError(f"largest hold-up {largest_holdup:g}: must be from {SHALLOWEST:g} to {DEEPEST:g}")

@@ -36,7 +36,7 @@ class Extremum:
     zeros: tuple[float, ...]
 
 
-def dips(values: Array, at: Array, *, passing: bool = False) -> list[Extremum]:
+def find_extrema(values: Array, at: Array, *, passing: bool = False) -> list[Extremum]:
     """The steps between the places ``at`` (k,) of a path in which ``values`` (k,) turn towards zero, and away again;
     ``passing`` zero alone, or all."""
     if len(values) < 3:

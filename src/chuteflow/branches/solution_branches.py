@@ -12,7 +12,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.paths import Chord, PathPoint, TurningPoint, find_value, point_at, refined, turns
+from chuteflow.branches.paths import (
+    Chord,
+    PathPoint,
+    TurningPoint,
+    find_value,
+    locate_turning_points,
+    refine_path,
+    solve_point,
+)
 from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
@@ -122,7 +130,7 @@ class SolutionBranch:
                 sign = 1.0 if weights[edge[0]] >= 0.0 else -1.0
                 weights = np.zeros(4)
                 weights[edge[0]], value = sign, sign * edge[1]
-        point = point_at(self.rough.start(i), weights, value, tolerance)
+        point = solve_point(self.rough.start(i), weights, value, tolerance)
         if point is None or np.linalg.norm(
             point.m - self.macroscopic[i]
         ) > _ROUGH + _ASTRAY * _SPACING_DEEP + self._bend(i):
@@ -178,7 +186,7 @@ class SolutionBranch:
         inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
-        return refined([first, *inner, last], tolerance)
+        return refine_path([first, *inner, last], tolerance)
 
     def traced(self, tolerance: float) -> list[TracedBranch]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
@@ -193,7 +201,7 @@ class SolutionBranch:
         pieces: list[list[PathPoint]] = [found[:1]]
         for one, other in pairwise(found):
             try:
-                pieces[-1] += refined([one, other], tolerance)[1:]
+                pieces[-1] += refine_path([one, other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
         ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
@@ -229,7 +237,7 @@ class SolutionBranch:
 @lru_cache(maxsize=_REMEMBERED)
 def find_branches(model: Model, within: SearchRange) -> tuple[SolutionBranch, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
-    found = [SolutionBranch(branch, within) for branch in search(model, within).branches if len(branch) > 1]
+    found = [SolutionBranch(branch, within) for branch in search_range(model, within).branches if len(branch) > 1]
     pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
     separate = [True] * len(found)
     for i, short in enumerate(found):
@@ -250,20 +258,20 @@ def find_branches(model: Model, within: SearchRange) -> tuple[SolutionBranch, ..
     )
 
 
-def search(model: Model, within: SearchRange) -> TrajectoryGrid:
+def search_range(model: Model, within: SearchRange) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
     return integrate_trajectories(
         model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux
     )
 
 
-def searched(within: SearchRange, grid: TrajectoryGrid) -> Searched:
+def describe_search(within: SearchRange, grid: TrajectoryGrid) -> Searched:
     """The range searched, and the cells that the search examined."""
     cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
     return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
 
 
-def doubt(
+def explain_incompleteness(
     grid: TrajectoryGrid,
     within: SearchRange,
     lost: list[Array],
@@ -291,7 +299,7 @@ def _place(macroscopic: Array) -> str:
     return f"M = {mass:.4g} and T_surface = {temperature:.4g}"
 
 
-def crossings(
+def solve_crossings(
     branch: SolutionBranch, which: int, value: float, tolerance: float = TOLERANCE
 ) -> tuple[list[Solution], list[Array]]:
     """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
@@ -389,7 +397,7 @@ def _solve_single(
     nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
     weights = np.zeros(4)
     weights[which] = 1.0
-    point = point_at(branch.rough.start(nearer), weights, target, tolerance)
+    point = solve_point(branch.rough.start(nearer), weights, target, tolerance)
     if point is None or abs(point.tangent[which]) < 0.5 * np.abs(slopes).min():
         return None
     fraction = off[i] / (off[i] - off[i + 1])
@@ -429,7 +437,7 @@ def _solve_among(
 def _on_path(points: list[PathPoint], which: int, target: float, tolerance: float) -> list[Solution]:
     """The flows on a path of solved points at which a quantity takes a value."""
     placed = [(float(i), point) for i, point in enumerate(points)]
-    turning = turns(points, which, tolerance)
+    turning = locate_turning_points(points, which, tolerance)
     placed += [(turn.place, turn.point) for turn in turning]
     placed.sort(key=lambda pair: pair[0])
     along = [point for _, point in placed]
@@ -516,7 +524,7 @@ class TracedBranch:
 
     def turns(self, which: int, tolerance: float) -> list[TurningPoint]:
         """The points at which a quantity turns."""
-        return turns(self.points, which, tolerance)
+        return locate_turning_points(self.points, which, tolerance)
 
     def at(self, places: Array, tolerance: float) -> list[PathPoint]:
         """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from chuteflow.explorer.queries import CONTROLS, ColumnAsked
-from chuteflow.maps.columns import PiecewiseConstant, column
-from chuteflow.maps.plane import HOT_CODES, SUMMARY, ParameterAxis, ParameterPlane, hot_code, summary
+from chuteflow.maps.columns import PiecewiseConstant, classify_column
+from chuteflow.maps.plane import HOT_CODES, SUMMARY, ParameterAxis, ParameterPlane, classify_hot, summarise
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 
@@ -46,11 +46,13 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     inner, outer = (x, y) if plane.transposed else (y, x)
     tolerance = _TOLERANCE_COARSE if asked.coarse else _TOLERANCE[BY_KEY[inner].of_base]
     first = _FIRST_COARSE if asked.coarse else _FIRST
-    found = column(place, partial(summary, plane), [*_evenly(first), *_beside(plane, asked, tolerance)], tolerance)
+    found = classify_column(
+        place, partial(summarise, plane), [*_evenly(first), *_beside(plane, asked, tolerance)], tolerance
+    )
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
     if plane.chute.surface == "free" and not asked.coarse:
-        hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
+        hot = classify_column(place, partial(classify_hot, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
         parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(
         outer,

@@ -242,7 +242,7 @@ def _heights(what: str, z: Array, trust: tuple[float, float] | None) -> tuple[Ar
     if (step <= 0.0).any():
         i = int(np.argmax(step <= 0.0))
         kind = "is there twice" if step[i] == 0.0 else f"comes after {z[i]:g}"
-        raise InputError(f"{what}z = {z[i + 1]:g} {kind}: heights must increase, each once")
+        raise InputError(f"{what}z = {z[i + 1]:g} {kind}: heights must rise, each once")
     low, high = trust or (-np.inf, np.inf)
     return z, (z >= low) & (z <= high)
 

@@ -198,7 +198,7 @@ def _part_from(stops: Any, values: Any) -> PiecewiseConstant:
 def _shares_from(kept: Any) -> tuple[float, ...]:
     found = tuple(number("a fraction of an axis", fraction, 0.0, 1.0) for fraction in kept)
     if any(one >= two for one, two in pairwise(found)):
-        raise InputError("fractions of an axis must increase")
+        raise InputError("fractions of an axis must rise")
     return found
 
 

@@ -213,7 +213,7 @@ def _breaks(kept: Any) -> tuple[float, ...]:
     breaks = numbers("the pieces of a grid", kept)
     ends = len(breaks) > len(WHOLE) and (breaks[0], breaks[-1]) == WHOLE
     if not ends or len(breaks) > MOST_PIECES + 1 or np.diff(breaks).min() <= 0.0:
-        raise InputError("the pieces of a grid: their ends must increase from 0 to 1")
+        raise InputError("the pieces of a grid: their ends must rise from 0 to 1")
     return tuple(breaks.tolist())
 
 

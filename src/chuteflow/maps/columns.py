@@ -72,13 +72,13 @@ class Column:
     parts: tuple[PiecewiseConstant, ...]
 
 
-def column(place: float, classify: Classify, fractions: Iterable[float], tolerance: float) -> Column:
+def classify_column(place: float, classify: Classify, fractions: Iterable[float], tolerance: float) -> Column:
     """The column at ``place``: classified at ``fractions`` and at both ends, and halved where the class changes."""
-    stops, codes = halved(place, classify, fractions, tolerance)
-    return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
+    stops, codes = halve(place, classify, fractions, tolerance)
+    return Column(place, tuple(find_part(stops, values) for values in zip(*codes, strict=True)))
 
 
-def halved(
+def halve(
     place: float, classify: Classify, fractions: Iterable[float], tolerance: float
 ) -> tuple[list[float], list[Code]]:
     """The stops of a column at ``place``, ascending, and the classes between them, one more."""
@@ -104,13 +104,13 @@ def halved(
     return stops, codes
 
 
-def part(stops: Sequence[float], values: Sequence[int]) -> PiecewiseConstant:
+def find_part(stops: Sequence[float], values: Sequence[int]) -> PiecewiseConstant:
     """The part of ``values`` between ``stops``, without stops at which nothing changes."""
     changes = [i for i in range(len(stops)) if values[i] != values[i + 1]]
     return PiecewiseConstant(tuple(stops[i] for i in changes), (values[0], *(values[i + 1] for i in changes)))
 
 
-def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: float) -> list[float]:
+def choose_fractions(place: float, nearby: Sequence[Column], guards: int, tolerance: float) -> list[float]:
     """Where to classify a new column: evenly at ``guards`` shares, and around the stops that those ``nearby`` (up
     to two to either side, ascending) lead to expect."""
     fractions = [(i + 0.5) / guards for i in range(guards)]
@@ -140,7 +140,7 @@ def _expected(place: float, places: Sequence[float], parts: Sequence[PiecewiseCo
     ]
 
 
-def between(left: Column, right: Column, number: int, place: float, tolerance: float) -> PiecewiseConstant:
+def interpolate_column(left: Column, right: Column, number: int, place: float, tolerance: float) -> PiecewiseConstant:
     """The part ``number`` at a place between two columns: on lines, or else as in the nearer one."""
     fraction = (place - left.place) / (right.place - left.place)
     pair = alike(left.parts[number], right.parts[number], tolerance)
@@ -152,7 +152,7 @@ def between(left: Column, right: Column, number: int, place: float, tolerance: f
     )
 
 
-def to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> list[tuple[int, float]]:
+def find_intervals_to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> list[tuple[int, float]]:
     """The intervals (index of the left column, place of the middle) whose inside the columns do not tell.
 
     Those are where for one of the numbers the row of values changes, or a stop, by the bend that the columns around

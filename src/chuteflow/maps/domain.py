@@ -21,10 +21,17 @@ from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Searched
 from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
-from chuteflow.maps.columns import Classify, Column, between, column, shares_for, to_halve
+from chuteflow.maps.columns import (
+    Classify,
+    Column,
+    choose_fractions,
+    classify_column,
+    find_intervals_to_halve,
+    interpolate_column,
+)
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.outlines import Outline, Region, boundaries, regions
-from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, code, hot_code
+from chuteflow.maps.outlines import Outline, Region, make_regions, trace_outlines
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, classify, classify_hot
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
 from chuteflow.result import Result
@@ -134,13 +141,13 @@ class Domain(Result):
     @cached_property
     def boundaries(self) -> tuple[Outline, ...]:
         """All boundaries between classes, as lines in the plane of the parameters."""
-        return boundaries(self.plane, self.columns, self.hot_columns, self.tolerance)
+        return trace_outlines(self.plane, self.columns, self.hot_columns, self.tolerance)
 
     def regions(self, *names: str) -> tuple[Region, ...]:
         """The plane cut up by the value of a number of the class, a name of CODES; of several names, by the sum of
         the first, twice the second and so on."""
         bits = {CODES.index(name): 2**i for i, name in enumerate(names)}
-        return regions(self.plane, self.columns, bits, self.tolerance)
+        return make_regions(self.plane, self.columns, bits, self.tolerance)
 
     @property
     def searched(self) -> Searched:
@@ -230,7 +237,7 @@ def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, pro
     """Columns as many as it takes, in order along the outer axis."""
     first = _FIRST_COLUMNS if tolerance < 5.0 * TOLERANCE else _FEWEST_COLUMNS
     tasks = [
-        _Task(plane, place, shares_for(place, (), _GUARDS, tolerance), tolerance)
+        _Task(plane, place, choose_fractions(place, (), _GUARDS, tolerance), tolerance)
         for place in np.linspace(0.0, 1.0, first).tolist()
     ]
     columns: list[Column] = []
@@ -240,12 +247,17 @@ def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, pro
             columns.append(found)
             progress(len(columns), known)
         columns.sort(key=lambda one: one.place)
-        wanted = to_halve(columns, tolerance, tolerance)
+        wanted = find_intervals_to_halve(columns, tolerance, tolerance)
         if len(columns) == first:
             # All that is narrower than the first columns are apart is searched for again.
             wanted = [(i, 0.5 * (left.place + right.place)) for i, (left, right) in enumerate(pairwise(columns))]
         tasks = [
-            _Task(plane, place, shares_for(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, tolerance), tolerance)
+            _Task(
+                plane,
+                place,
+                choose_fractions(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, tolerance),
+                tolerance,
+            )
             for i, place in wanted
         ]
     return columns
@@ -262,18 +274,20 @@ class _Task:
 
 
 def _column(task: _Task) -> Column:
-    return column(task.place, partial(code, task.plane), task.shares, task.tolerance)
+    return classify_column(task.place, partial(classify, task.plane), task.shares, task.tolerance)
 
 
 def _hot_columns(plane: ParameterPlane, tolerance: float) -> list[Column]:
     """Columns of what is known in closed form, finer than the others."""
     fine = 0.1 * tolerance
-    classify: Classify = partial(hot_code, plane)
+    classify: Classify = partial(classify_hot, plane)
     places = np.linspace(0.0, 1.0, _HOT_COLUMNS).tolist()
-    columns = [column(place, classify, shares_for(place, (), _GUARDS, fine), fine) for place in places]
-    while wanted := to_halve(columns, fine, fine):
+    columns = [classify_column(place, classify, choose_fractions(place, (), _GUARDS, fine), fine) for place in places]
+    while wanted := find_intervals_to_halve(columns, fine, fine):
         columns += [
-            column(place, classify, shares_for(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, fine), fine)
+            classify_column(
+                place, classify, choose_fractions(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, fine), fine
+            )
             for i, place in wanted
         ]
         columns.sort(key=lambda one: one.place)
@@ -292,6 +306,6 @@ def _gridded(
     grid = np.empty((len(outer), len(inner)), dtype=np.int16)
     for i, place in enumerate(outer.tolist()):
         right = int(np.clip(np.searchsorted(places, place), 1, len(columns) - 1))
-        part = between(columns[right - 1], columns[right], number, place, tolerance)
+        part = interpolate_column(columns[right - 1], columns[right], number, place, tolerance)
         grid[i] = np.array(part.values, dtype=np.int16)[np.searchsorted(part.stops, inner, side="right")]
     return grid

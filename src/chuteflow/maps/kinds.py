@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.counting import most_at_once
-from chuteflow.branches.rough_turns import dips
-from chuteflow.maps.zeros import Index, Zeros, lagrange, zeros_on
+from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros, lagrange
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import TrajectoryGrid
@@ -44,13 +44,13 @@ class FlowClasses:
     doubtful: bool
 
 
-def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
+def classify_flows(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
     """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
-    of :func:`chuteflow.maps.zeros.extremes_on`."""
+    of :func:`chuteflow.maps.zeros.bound_extremes`."""
     lines = [line for line, _ in grid.lines if len(line) > 1]
     if not lines:
         return FlowClasses((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
-    zeros = zeros_on(grid, extremes)
+    zeros = evaluate_zeros(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
     pieces, interior, density = [], 0, 0
     for line in lines:
@@ -146,7 +146,9 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     """The steps in which ``rise`` changes sign, and the fractions of them at which it does so; a step in which it
     passes zero twice, as just beyond a cusp, is there twice."""
     changes = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
-    pairs = [(dip.step, zero) for dip in dips(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros]
+    pairs = [
+        (dip.step, zero) for dip in find_extrema(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros
+    ]
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
     fractions = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]

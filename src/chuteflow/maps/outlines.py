@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.maps.columns import Column, PiecewiseConstant, alike, part
+from chuteflow.maps.columns import Column, PiecewiseConstant, alike, find_part
 from chuteflow.maps.plane import CODES, HOT_CODES, ParameterPlane
 from chuteflow.result import Compared
 
@@ -76,7 +76,7 @@ KINDS_OF_BOUNDARIES = {
 _BOUNDS = {"base": "F21=0", "inside": "delta=0", "steep": "lambda=3", "inversion": "lambda=0.660"}
 
 
-def boundaries(
+def trace_outlines(
     plane: ParameterPlane, columns: Sequence[Column], hot_columns: Sequence[Column], tolerance: float
 ) -> tuple[Outline, ...]:
     """Every boundary of the map, kind by kind."""
@@ -99,7 +99,7 @@ def boundaries(
     return tuple(found)
 
 
-def regions(
+def make_regions(
     plane: ParameterPlane, columns: Sequence[Column], bits: dict[int, int], tolerance: float
 ) -> tuple[Region, ...]:
     """Polygons that fill the plane, one between two stops of neighbouring columns.
@@ -130,7 +130,7 @@ def _summed(parts: Sequence[PiecewiseConstant], factors: Sequence[int]) -> Piece
     stops = sorted({stop for one in parts for stop in one.stops})
     inside = [0.5 * (a + b) for a, b in pairwise([-1.0, *stops, 2.0])]
     values = [sum(f * one.at(fraction) for f, one in zip(factors, parts, strict=True)) for fraction in inside]
-    return part(stops, values)
+    return find_part(stops, values)
 
 
 def _hot_boundaries(plane: ParameterPlane, columns: Sequence[Column], tolerance: float) -> Iterator[Outline]:

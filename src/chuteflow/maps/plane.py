@@ -16,8 +16,8 @@ from chuteflow.branches.counting import most_solved
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.maps.kinds import DENSITIES, INTERIORS, FlowClasses, kinds
-from chuteflow.maps.zeros import extremes_on
+from chuteflow.maps.kinds import DENSITIES, INTERIORS, FlowClasses, classify_flows
+from chuteflow.maps.zeros import bound_extremes
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
@@ -67,7 +67,7 @@ class ParameterAxis:
             object.__setattr__(self, end, number(self.name, getattr(self, end)))
         object.__setattr__(self, "high", PARAMETERS[self.name].rounded(self.high))
         if not self.low < self.high:
-            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must increase")
+            raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
 
     def at(self, fraction: Any) -> Any:
         """The value (or values) at a fraction of the range, 0 to 1."""
@@ -126,7 +126,7 @@ class ParameterPlane:
         return self.at(v, u) if self.transposed else self.at(u, v)
 
 
-def code(plane: ParameterPlane, outer: float, inner: float) -> Code:
+def classify(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """The class of the point at fractions of the outer and inner axis of ``plane``, by CODES."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     return (
@@ -138,24 +138,24 @@ def code(plane: ParameterPlane, outer: float, inner: float) -> Code:
     )
 
 
-def summary(plane: ParameterPlane, outer: float, inner: float) -> Code:
+def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """The class of the point at fractions of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
     found = _kinds(plane, plane.chute_at(outer, inner))
-    hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    hot = classify_hot(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
     return (hot, found.most, found.families, found.interior, found.density)
 
 
 def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
     grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
     problem = model(chute)
-    found = kinds(grid.of_base(problem), extremes, plane.temperatures)
+    found = classify_flows(grid.of_base(problem), extremes, plane.temperatures)
     if not found.doubtful:
         return found
     most = most_solved(problem, plane.within, _TOLERANCE)
     return found if most is None else replace(found, most=most, doubtful=False)
 
 
-def hot_code(plane: ParameterPlane, outer: float, inner: float) -> Code:
+def classify_hot(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """What is known in closed form of the point at fractions of the outer and inner axis, by HOT_CODES.
 
     All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
@@ -198,7 +198,7 @@ def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[Traject
         temperature = np.unique(np.concatenate([temperature[apart > _SAME], plane.temperatures]))
     others = envelope([model(base) for base in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
     grid = integrate_trajectories_from(model(chute), others, temperature, within.deepest)
-    return grid, extremes_on(grid)
+    return grid, bound_extremes(grid)
 
 
 @lru_cache(maxsize=64)

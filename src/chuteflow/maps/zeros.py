@@ -73,14 +73,14 @@ class Zeros:
         )
 
 
-def extremes_on(grid: TrajectoryGrid) -> Array:
+def bound_extremes(grid: TrajectoryGrid) -> Array:
     """Bounds of what trajectories have had down to each state, whatever their base, (N, 6), as in :class:`Zeros`."""
     return kernel.bound_extremes(
         grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
     )
 
 
-def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
+def evaluate_zeros(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     """The zeros of B on ``grid``, given its ``extremes`` (N, 6)."""
     ends = grid.zeros[:, :2].astype(np.int64)
     share = grid.zeros[:, 2]

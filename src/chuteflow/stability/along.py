@@ -19,7 +19,7 @@ from chuteflow.checks import whole
 from chuteflow.errors import SolveError
 from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import End, neutral_curves
-from chuteflow.stability.planes import FamilyPlane, scanned
+from chuteflow.stability.planes import FamilyPlane, scan_plane
 from chuteflow.stability.result import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
@@ -113,7 +113,9 @@ class MarkedCurve:
 
 @on_one_thread
 @np.errstate(under="ignore")
-def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
+def mark_stability(
+    curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None
+) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 
     Args:
@@ -210,7 +212,7 @@ def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
     low = float(np.log(RANGE[0]))
     plane = FamilyPlane(flows, float(np.arctan2(mode.ky, mode.kx)), low, float(np.log(max(3.0 * k, 0.1))) - low)
     extremes = []
-    for curve in neutral_curves(plane, scanned(plane, _PLANE)):
+    for curve in neutral_curves(plane, scan_plane(plane, _PLANE)):
         i = int(curve.z[:, 1].argmin())
         ended = {0: curve.ends[0], len(curve.z) - 1: curve.ends[1]}.get(i, End.EDGE)
         extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended is End.EDGE and curve.z[i, 1] > 0.0))

@@ -14,7 +14,7 @@ from chuteflow.errors import InputError
 from chuteflow.stability import relaxation
 from chuteflow.stability.layer import Layer
 from chuteflow.stability.planes import FamilyMap, WaveMap, family_map, wave_map
-from chuteflow.stability.relaxation import Relaxation, disturbed, outcome
+from chuteflow.stability.relaxation import Relaxation, disturb, outcome
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 
@@ -106,7 +106,7 @@ def relax(
     if temperature is None:
         temperature = HEAT if velocity is None else 1.0
     layer = Layer.of(flow)
-    start = disturbed(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
+    start = disturb(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
     moments = []
     for moment in relaxation.relax(layer, start, duration):
         moments.append(moment)

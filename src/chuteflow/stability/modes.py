@@ -21,7 +21,7 @@ from chuteflow import display
 from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
-from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
+from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue, spectrum
 from chuteflow.result import Compared
 from chuteflow.stability.base import BaseState, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
@@ -239,7 +239,7 @@ class Disturbances:
         """The same, and the change between the grids in fractions of the distance to the continuous spectrum."""
         coarse, fine = self._resolutions(kx, ky, level)
         of = self.operator(fine)
-        sigma, vector = refined(of.matrix(kx, ky), of.weights, candidate)
+        sigma, vector = refine_eigenvalue(of.matrix(kx, ky), of.weights, candidate)
         error = abs(sigma - candidate)
         away = max(float(distance(np.array([sigma]), self._curve(coarse, kx))[0]), 1e-300)
         if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
@@ -251,7 +251,7 @@ class Disturbances:
     def followed(self, kx: float, ky: float, near: complex, level: int = 0) -> Mode | None:
         """The mode whose rate is closest to ``near``, its value at wavenumbers close by: much faster than a search."""
         of = self.coarse_operator(kx, ky, level)
-        return self.checked(kx, ky, refined(of.matrix(kx, ky), of.weights, near)[0], level)
+        return self.checked(kx, ky, refine_eigenvalue(of.matrix(kx, ky), of.weights, near)[0], level)
 
     def coarse_operator(self, kx: float, ky: float, level: int = 0) -> Operator:
         """The operator on the coarse grid for these wavenumbers."""

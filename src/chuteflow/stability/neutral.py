@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, closes, trace
-from chuteflow.numerics.eigenproblem import Complex, refined
+from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue
 from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.result import Compared
 from chuteflow.stability.modes import Disturbances
@@ -303,4 +303,4 @@ class _GrowthSystem:
     def _sigma(self, z: Array, near: complex, level: int = _LEVEL) -> complex:
         disturbances, kx, ky = self._plane.wave(z)
         of = disturbances.coarse_operator(kx, ky, level)
-        return refined(of.matrix(kx, ky), of.weights, near)[0]
+        return refine_eigenvalue(of.matrix(kx, ky), of.weights, near)[0]

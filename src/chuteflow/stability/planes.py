@@ -99,7 +99,7 @@ class FamilyPlane:
         return self._kept[place]
 
 
-def scanned(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _silent) -> EigenvalueGrid:
+def scan_plane(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _silent) -> EigenvalueGrid:
     """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not resolve it, that is
     marked."""
     a, b = (np.linspace(0.0, end, n) for end, n in zip(plane.size, points, strict=True))
@@ -220,7 +220,7 @@ def wave_map(
     ends = [(0.0, usual) if given is None else given for given in (kx, ky)]
     low, unit = [low for low, _ in ends], [high - low for low, high in ends]
     plane = WavePlane(Disturbances(flow), (low[0], low[1]), (unit[0], unit[1]))
-    scan = scanned(plane, size, progress)
+    scan = scan_plane(plane, size, progress)
     curves = neutral_curves(plane, scan)
     scaled = [replace(c, z=np.array(low) + np.array(unit) * c.z, error=c.error * max(unit)) for c in curves]
     return WaveMap(
@@ -266,10 +266,10 @@ def family_map(
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
     low, high = pair("depth_wavenumber", depth_wavenumber)
     if not 0.0 < low < high <= _LARGEST_DEPTH_WAVENUMBER:
-        raise InputError(f"k h from {low:g} to {high:g}: must increase, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
+        raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
     low, high = np.log((low, high))
     plane = FamilyPlane(flows, float(np.radians(angle)), float(low), float(high - low))
-    scan = scanned(plane, size, progress)
+    scan = scan_plane(plane, size, progress)
     curves = neutral_curves(plane, scan)
     columns = tuple(plane.flow(float(place)) for place in scan.b)
     return FamilyMap(
@@ -307,4 +307,4 @@ def _check_range(name: str, low: float, high: float) -> None:
     for k in (low, high):
         check_wavenumbers(*((k, 0.0) if name == "kx" else (0.0, k)))
     if not low < high:
-        raise InputError(f"{name} from {low:g} to {high:g}: the range must increase")
+        raise InputError(f"{name} from {low:g} to {high:g}: the range must rise")

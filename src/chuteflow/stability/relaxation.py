@@ -154,7 +154,7 @@ def _distance(moment: RelaxationState, flow: Flow) -> float:
     return max(abs(getattr(moment, name) / getattr(flow, name) - 1.0) for name in names)
 
 
-def disturbed(state: Array, temperature: float = 1.0, velocity: float = 1.0) -> Array:
+def disturb(state: Array, temperature: float = 1.0, velocity: float = 1.0) -> Array:
     """``state`` with its granular temperature and its velocity multiplied, and its density as it is.
 
     Raises:

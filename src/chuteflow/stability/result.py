@@ -24,7 +24,7 @@ from chuteflow.stability.modes import (
     check_wavenumbers,
     leading,
 )
-from chuteflow.stability.search import FastestMode, fastest
+from chuteflow.stability.search import FastestMode, find_fastest
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -110,7 +110,7 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
         k = float(np.hypot(kx, ky))
         searched, found = (k, k), _single(disturbances, kx, ky)
     else:
-        found = fastest(disturbances, searched, kx, ky)
+        found = find_fastest(disturbances, searched, kx, ky)
     return Stability(
         flow=flow,
         mode=found.mode,

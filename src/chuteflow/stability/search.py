@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.eigenproblem import Complex, Eigenpair, refined_pair
+from chuteflow.numerics.eigenproblem import Complex, Eigenpair, refine_eigenpair
 from chuteflow.stability.linear import Operator
 from chuteflow.stability.modes import (
     DEGREES,
@@ -92,7 +92,7 @@ class _SearchPoint:
         return complex(self.sigma + self.slope @ np.array([log_k - self.log_k, angle - self.angle]))
 
 
-def fastest(
+def find_fastest(
     disturbances: Disturbances, searched: tuple[float, float], kx: float | None = None, ky: float | None = None
 ) -> FastestMode:
     """The mode of largest growth with k in ``searched``; a wavenumber that is given is held, and the other searched.
@@ -305,7 +305,7 @@ class _GrowthMaximisation:
         kx, ky = self.search.wave(log_k, angle)
         start = None if origin.pair is None else origin.pair.right
         near = origin.predicted(log_k, angle)
-        pair = refined_pair(of.matrix(kx, ky), of.weights, near, start=start)
+        pair = refine_eigenpair(of.matrix(kx, ky), of.weights, near, start=start)
         by_k = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
         return _SearchPoint(log_k, angle, pair.value, pair, self.search.directions(kx, ky) @ by_k)
 

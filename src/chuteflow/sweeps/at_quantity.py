@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.rough_turns import may_turn
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.roots import zeros
+from chuteflow.numerics.roots import find_zeros
 from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.sweeps.aligned import AlignedArrays
-from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
+from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, evaluate_flows, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
@@ -124,10 +124,10 @@ class Problem:
     def _marched(self, member: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
         some, temperature = self.batch.take(member), np.exp(log_t)
         found = march(some, temperature, self.ends.take(member), accuracy, meets_base)
-        return flows_on(some, temperature, found), found.trouble
+        return evaluate_flows(some, temperature, found), found.trouble
 
 
-def at_quantity(
+def solve_at_quantity(
     batch: Batch,
     which: int,
     value: Array,
@@ -374,7 +374,7 @@ class FlowsInBrackets:
         state = np.full((found.state.shape[0], which.size), np.nan)
         state[:, there] = found.state[:, safe[there]]
         with np.errstate(invalid="ignore"):
-            return flows_on(some, temperature, EventZeros(np.arange(which.size), state, found.trouble))
+            return evaluate_flows(some, temperature, EventZeros(np.arange(which.size), state, found.trouble))
 
     def rough(self) -> tuple[Array, Array]:
         """ln T of the flows by rough trajectories, and the slope of the quantity's logarithm over it in the bracket."""
@@ -384,7 +384,7 @@ class FlowsInBrackets:
             return self.at(which, log_t, _POLISH).macroscopic[self._problem.which] - self._target[which]
 
         slope = (b.f_high - b.f_low) / (b.high - b.low)
-        return zeros(off, b.low, b.high, b.f_low, b.f_high, _NEAR, _NEAR), slope
+        return find_zeros(off, b.low, b.high, b.f_low, b.f_high, _NEAR, _NEAR), slope
 
     def polished(self, which: Indices, log_t: Array, slope: Array, accuracy: Accuracy) -> tuple[Array, Array, Array]:
         """ln T where the quantity has its value, the slope there, and (ln Q, ln h, ln M, ln T) (4, m): by secants."""

@@ -55,7 +55,7 @@ def meets_base(at: Pointwise, _: Indices) -> Array:
     return at.y - at.base_flux
 
 
-def flows_on(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
+def evaluate_flows(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
     """The zeros of :func:`meets_base` as flows, without an error yet."""
     member, state = found.member, found.state
     at = batch.take(member).at_state(state)
@@ -69,7 +69,7 @@ def flows_on(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
     return Flows(member, temperature[member], state, macroscopic, np.full(member.size, np.inf))
 
 
-def at_temperature(
+def solve_at_temperature(
     batch: Batch, temperature: Array, largest_holdup: float, tolerance: float
 ) -> tuple[Flows, NDArray[np.bool_]]:
     """Every flow at the surface temperatures (n,) with hold-ups up to ``largest_holdup``, and the members (n,) on
@@ -79,7 +79,7 @@ def at_temperature(
     coarse = march(batch, temperature, ends, LADDER[0], meets_base)
     unsettled = coarse.trouble.copy()
     unsettled[coarse.member] = True
-    previous = flows_on(batch, temperature, coarse)
+    previous = evaluate_flows(batch, temperature, coarse)
     settled: list[Flows] = []
     for finer in LADDER[1:]:
         pending = np.flatnonzero(unsettled)
@@ -91,10 +91,10 @@ def at_temperature(
         last[coarse.trouble] = np.inf
         there = ends.take(pending).above(last[pending])
         found = march(batch.take(pending), temperature[pending], there, finer, meets_base)
-        fine = flows_on(batch, temperature, EventZeros(pending[found.member], found.state, unsettled))
+        fine = evaluate_flows(batch, temperature, EventZeros(pending[found.member], found.state, unsettled))
         trouble = np.zeros(len(batch), dtype=bool)
         trouble[pending] = found.trouble
-        fine, agreed = compared(len(batch), previous, fine, least_error(finer))
+        fine, agreed = estimate_errors(len(batch), previous, fine, least_error(finer))
         worst = np.zeros(len(batch))
         np.maximum.at(worst, fine.member, fine.error)
         done = unsettled & agreed & ~trouble & (worst <= tolerance)
@@ -110,7 +110,7 @@ def least_error(accuracy: Accuracy) -> float:
     return max(_FLOOR, _CHANCE * accuracy.tolerance)
 
 
-def compared(members: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
+def estimate_errors(members: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
     """The finer flows with the error that their distance from the coarser ones tells, at ``least`` so much, and the
     members on which both are equally many."""
     many = np.bincount(coarse.member, minlength=members)

@@ -154,7 +154,7 @@ def _range(name: str, key: str, value: Mapping[str, Any]) -> DesignAxis:
     if scale not in _SCALES:
         raise InputError(f"{key}.scale = {shown(scale)}: choose one of {', '.join(_SCALES)}")
     if not low < high:
-        raise InputError(f"{key} from {low:g} to {high:g}: must increase")
+        raise InputError(f"{key} from {low:g} to {high:g}: must rise")
     if scale == "log" and low <= 0.0:
         raise InputError(f"{key}.from = {low:g}: must be above 0 on the log scale")
     count = value.get("points", 0)

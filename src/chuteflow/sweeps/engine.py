@@ -17,10 +17,10 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.sweeps.at_quantity import at_quantity
-from chuteflow.sweeps.bases import Flows, at_temperature
+from chuteflow.sweeps.at_quantity import solve_at_quantity
+from chuteflow.sweeps.bases import Flows, solve_at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
-from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, numbers
+from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, evaluate_quantities
 from chuteflow.sweeps.outcome import Flags, PointStatus, Reason, reasons
 from chuteflow.sweeps.stability import STABILITY_KINDS, STABILITY_NUMBERS, needs_stability, stability_quantities
 from chuteflow.sweeps.study import RANGES, Study
@@ -206,9 +206,9 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
         if study.condition == "T_surface":
-            flows, unsettled = at_temperature(batch, value, study.largest_holdup, study.tolerance)
+            flows, unsettled = solve_at_temperature(batch, value, study.largest_holdup, study.tolerance)
         else:
-            flows, unsettled = at_quantity(
+            flows, unsettled = solve_at_quantity(
                 batch,
                 _WHICH[study.condition],
                 value,
@@ -216,7 +216,7 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
                 study.largest_holdup,
                 study.tolerance,
             )
-        return _sound(_Solved(flows, numbers(study.quantities, batch, flows), unsettled))
+        return _sound(_Solved(flows, evaluate_quantities(study.quantities, batch, flows), unsettled))
     except _FAILURES:
         if len(batch) == 1:
             return _Solved(Flows.joined([]), dict.fromkeys(study.quantities, np.empty(0)), np.ones(1, dtype=bool))

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.roots import zeros
+from chuteflow.numerics.roots import find_zeros
 from chuteflow.sweeps.aligned import AlignedArrays
 from chuteflow.sweeps.batch import FLUX, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, SHEAR_FLUX, Batch, Indices, Pointwise
 
@@ -314,7 +314,7 @@ def _located(
     brackets += list(_closer(partial, other, seen[0, other], seen[-1, other]))
     which, low, high, f_low, f_high = (np.concatenate(part) for part in zip(*brackets, strict=True))
     which = which.astype(np.intp)
-    fraction = zeros(lambda some, x: partial.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
+    fraction = find_zeros(lambda some, x: partial.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
     end, _ = partial.to(which, fraction)
     return member[which], end
 

@@ -25,7 +25,7 @@ _DECIDES = 1e-9
 ONE_BY_ONE = ("surface_velocity", "mean_volume_fraction")
 
 
-def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
+def evaluate_quantities(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
     """The quantities ``names`` of the flows, (k,) each; kinds as their places among KINDS."""
     of = batch.take(flows.member)
     plain = {

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Law, reduce
 
@@ -367,7 +367,7 @@ def hot_solution(lambda_: float) -> HotSolution:
     """
     if not (math.isfinite(lambda_) and lambda_ < LAMBDA_C and lambda_ != 0.0):
         raise InputError(f"lambda = {lambda_}: hot flows have a lambda below 3, other than 0")
-    return HotSolution(lambda_, bisected(*_base_condition(lambda_)))
+    return HotSolution(lambda_, bisect(*_base_condition(lambda_)))
 
 
 def _base_condition(lambda_: float) -> tuple[Callable[[float], float], float, float]:
@@ -406,7 +406,7 @@ def _inversion() -> float:
     """x at which 2 x I_1(x)/I_0(x) = 1."""
     from scipy.special import i0e, i1e
 
-    return bisected(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
+    return bisect(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
 
 
 def _c0(y: Field, sign: float) -> Field:

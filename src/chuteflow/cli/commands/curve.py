@@ -75,11 +75,13 @@ def command(**given: Any) -> None:
 
 
 def _mark_stability(found: Curve, samples: int | None) -> MarkedCurve:
-    from chuteflow.stability.along import marked
+    from chuteflow.stability.along import mark_stability
 
     chosen = {} if samples is None else {"samples": samples}
     with Progress() as progress:
-        return marked(found, progress=lambda fraction: progress.show(f"{fraction:.0%} of the flows examined"), **chosen)
+        return mark_stability(
+            found, progress=lambda fraction: progress.show(f"{fraction:.0%} of the flows examined"), **chosen
+        )
 
 
 def _report(found: Curve, stability: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:

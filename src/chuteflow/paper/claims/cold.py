@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from chuteflow import Chute
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import reduce
 from chuteflow.theory.laws import law
@@ -40,4 +40,4 @@ def cold_slope_bounds(chute: Chute) -> tuple[float, float]:
         net = max(float(r.loss[0] - slope**2 * r.work[0]), 0.0)
         return given(slope) - math.sqrt(2.0 * float(r.conduction[0]) * net / (1.0 - k))
 
-    return bisected(given, 0.0, 10.0), bisected(surplus, 0.0, 10.0)
+    return bisect(given, 0.0, 10.0), bisect(surplus, 0.0, 10.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import Chute, curve, flows, hot
 from chuteflow.maps import exists_at
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.paper.claims.cold import cold_slope_bounds
 from chuteflow.paper.claims.hot_flows import slope_of_lambda
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
@@ -410,7 +410,7 @@ def bounds_of_slope() -> Finding:
     def surplus(square: float) -> float:
         return b.m * square - b.l - math.sqrt(max(b.L - b.M * square, 0.0))
 
-    highest = math.sqrt(bisected(surplus, b.l / b.m, b.L / b.M))
+    highest = math.sqrt(bisect(surplus, b.l / b.m, b.L / b.M))
     back = {"lambda at theta_0": hot(dissipative(highest)).parameters.lambda_}
     F21 = hot(dissipative(lowest)).parameters.F21
     return decide(
