@@ -78,7 +78,7 @@ def test_versions_agree():
 
 def test_the_recipe_for_conda_has_the_same_requirements():
     def names(requirements):
-        return {re.match(r"[\w-]+", one)[0].replace("-base", "") for one in requirements}
+        return {re.split(r"[^\w-]", one)[0].replace("-base", "") for one in requirements}
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]

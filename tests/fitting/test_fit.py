@@ -291,7 +291,7 @@ def test_what_is_known_is_not_free(flow):
 
 def test_sampling_without_its_extra_says_what_to_install(noisy, monkeypatch):
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(InputError, match=r"install chuteflow\[bayes\]"):
+    with pytest.raises(InputError, match=r"install 'chuteflow\[bayes\]'"):
         sample(noisy)
 
 

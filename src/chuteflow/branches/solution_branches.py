@@ -291,7 +291,7 @@ def explain_incompleteness(
     hidden = [m for m in grid.hidden if within.contains(m) and np.isfinite(m).all()]
     if value is not None:
         hidden = [m for m in hidden if abs(m[which] - np.log(value)) < _HIDDEN]
-    return f"the search does not resolve flows near {_place(hidden[0])}" if hidden else None
+    return f"the search does not tell flows apart near {_place(hidden[0])}" if hidden else None
 
 
 def _place(macroscopic: Array) -> str:
