@@ -929,3 +929,19 @@ def test_a_touch_reads_a_chart(tab):
     expect(page.locator("#profile-T .tip")).to_be_visible()
     expect(page.locator("#profile-nu .tip")).to_be_visible()
     context.close()
+
+
+@pytest.mark.slow
+def test_the_button_writes_a_page_that_needs_no_server(page, tmp_path):
+    opened(page, "?slope=0.31&Q=5&si=1&d=2")
+    with page.expect_download(timeout=100_000) as download:
+        page.locator("[data-export=page-html]").click()
+    assert download.value.suggested_filename == "chuteflow.html"
+    path = tmp_path / "chuteflow.html"
+    download.value.save_as(path)
+    assert 100_000 < path.stat().st_size < 2_000_000
+    page.goto(path.as_uri())
+    expect(page.locator("#says")).to_contain_text("Three flows share the flux Q = 3.42")
+    expect(page.locator("#sliders")).to_contain_text("grains: diameter 0.002 m, density 2500 kg/m^3", ignore_case=True)
+    assert page.locator(".served:visible").count() == 0
+    page.asked.clear()
