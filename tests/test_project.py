@@ -335,6 +335,35 @@ def test_a_class_name_with_two_meanings_is_seen():
     }
 
 
+def named_objects() -> Iterator[tuple[Path, str]]:
+    """The dotted names to which the documentation and the docstrings refer."""
+    role = re.compile(r"(?:\{py:\w+\}|:(?:class|func|meth|attr|data|mod):)`~?(chuteflow[\w.]*)`")
+    for path in [*(ROOT / "docs").rglob("*.md"), *MODULES.values()]:
+        for found in role.finditer(path.read_text(encoding="utf-8")):
+            yield path.relative_to(ROOT), found[1]
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name is a module, or something in one."""
+    module = module_named(name)
+    if module is None:
+        return False
+    found: object = import_module(module)
+    for part in name.removeprefix(module).strip(".").split(".") if name != module else ():
+        if part in getattr(found, "__dataclass_fields__", {}):
+            return True
+        if not hasattr(found, part):
+            return False
+        found = getattr(found, part)
+    return True
+
+
+def test_the_documentation_refers_to_what_exists():
+    assert [(str(path), name) for path, name in named_objects() if not exists(name)] == []
+    assert not exists("chuteflow.trajectories.kernel.walk")
+    assert not exists("chuteflow.walk")
+
+
 def test_only_the_command_line_prints():
     calls = [
         f"{module}, line {node.lineno}"

@@ -156,6 +156,17 @@ def _not_finite(word: str) -> NoReturn:
     raise InputError(f"{word} is in it: numbers must be finite")
 
 
+def place_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
+    """Where a flow is on its branch: Q, h, M and T_surface."""
+    return _numbers(flow, PLACE, scales)
+
+
+def places_object(flows: Iterable[Flow], scales: Scales | None = None) -> dict[str, list[Any]]:
+    """The same of several flows, as lists."""
+    places = [place_object(flow, scales) for flow in flows]
+    return {NUMBERS[name].symbol: [place[NUMBERS[name].symbol] for place in places] for name in PLACE}
+
+
 def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[str, float | str | None]:
     return {NUMBERS[name].symbol: finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in names}
 

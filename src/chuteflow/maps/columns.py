@@ -73,7 +73,7 @@ class Column:
 
 
 def column(place: float, classify: Classify, fractions: Iterable[float], tolerance: float) -> Column:
-    """The column at ``place``: classified at ``shares`` and at both ends, and halved where the class changes."""
+    """The column at ``place``: classified at ``fractions`` and at both ends, and halved where the class changes."""
     stops, codes = halved(place, classify, fractions, tolerance)
     return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
 

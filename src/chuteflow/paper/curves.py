@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +103,16 @@ def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, t
     style.write(ax, begin + 0.54 * width, top, r"slope $\tan\theta$", xytext=(0.0, 13.0), ha="center")
     # The letter of the panel stands clear of them.
     ax.set_title(ax.get_title(loc="left"), loc="left", x=-0.12, **style.title())
+
+
+def draw_two(data: Curves, lines: Mapping[str, tuple[style.LineStyle, str]], right: float, top: float) -> Figure:
+    """One panel with the curves of two chutes, ``lines`` their style and name."""
+    figure, (ax,) = style.panels(1, width=3.8, height=3.2)
+    for name, found in data.curves.items():
+        draw_plain(ax, found, *lines[name])
+    frame(ax, right, top)
+    style.legend(ax, loc="center right")
+    return figure
 
 
 def frame(ax: Axes, right: float, top: float, *, ordinate: bool = True) -> None:

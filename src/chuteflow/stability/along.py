@@ -75,7 +75,7 @@ class Change:
     """Where stability changes: a ``flow`` at a ``position`` along a branch, with the ``error`` of its T_surface.
 
     If ``neutral``, it is the neutral point, where growth vanishes for the waves of the range searched. Else it is the
-    middle of the two flows between which the verdict changes, half of their distance the error.
+    middle of the two flows between which stability changes, half of their distance the error.
     """
 
     flow: Flow

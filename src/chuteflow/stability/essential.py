@@ -33,7 +33,7 @@ def relaxation(flow_base: BaseState) -> tuple[Array, Array]:
 
 
 def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:
-    """u and -Re sigma_c where ``share`` of the mass lies above."""
+    """u and -Re sigma_c where ``fraction`` of the mass lies above."""
     profile = flow.at_overburden(fraction)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, flow.law
@@ -43,12 +43,6 @@ def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:
     stiffness = (g.compressibility + nu * (g.compressibility_slope + g.compressibility * warming)) * T
     viscosity = (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * np.sqrt(T)
     return profile.velocity, nu * stiffness / viscosity
-
-
-def continuous_spectrum(flow_base: BaseState, kx: float) -> Complex:
-    """sigma_c(z) from far above down to the base, as points of a curve; it does not depend on ky."""
-    velocity, rate = relaxation(flow_base)
-    return -1j * kx * velocity - rate
 
 
 def distance(values: Complex, curve: Complex) -> Array:
