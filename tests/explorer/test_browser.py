@@ -685,7 +685,7 @@ def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
     # Where the question cannot be posed, it is asked once.
     page.unroute("**/ask/stability?*")
     page.locator("#surface").select_option("interface")
-    expect(said).to_contain_text("Stability of 1 flows of the curve, 8 to come: × unstable (0)", timeout=20_000)
+    expect(said).to_contain_text("Stability of 1 flow of the curve, 8 to come: × unstable (0)", timeout=20_000)
 
 
 def test_values_are_read_off_every_chart_by_mouse_and_by_keyboard(page):
@@ -929,3 +929,21 @@ def test_a_touch_reads_a_chart(tab):
     expect(page.locator("#profile-T .tip")).to_be_visible()
     expect(page.locator("#profile-nu .tip")).to_be_visible()
     context.close()
+
+
+@pytest.mark.slow
+def test_the_button_writes_a_page_that_needs_no_server(page, tmp_path):
+    opened(page, "?slope=0.31&Q=5&si=1&d=2")
+    with page.expect_download(timeout=100_000) as download:
+        page.locator("[data-export=page-html]").click()
+    assert download.value.suggested_filename == "chuteflow.html"
+    path = tmp_path / "chuteflow.html"
+    download.value.save_as(path)
+    assert 100_000 < path.stat().st_size < 2_000_000
+    page.goto(path.as_uri())
+    expect(page.locator("#says")).to_contain_text("Three flows share the flux Q = 3.42")
+    expect(page.locator("#kept-words")).to_contain_text(
+        "grains: diameter 0.002 m, density 2500 kg/m^3", ignore_case=True
+    )
+    assert page.locator(".served:visible").count() == 0
+    page.asked.clear()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: Addresses that stand for all of this machine's, under names that cannot be known.
 _ANY = ("0.0.0.0", "::")
 #: The flux of a page where none is given.
-_FLUX = "3"
+_FLUX = 3.0
 _EPILOG = (
     "The page opens with what is given of the chute. --export writes it instead as one file that needs no server: "
     "every flow of the chute in the range searched, with a slider for the flux.\n\n"
@@ -101,8 +101,9 @@ def _flux(given: dict[str, Any], slope: float, scales: Scales | None) -> float:
     from chuteflow.checks import number_in
     from chuteflow.explorer.queries import FLUX_RANGE
 
-    asked = given | {"flux": given["flux"] or _FLUX}
-    return number_in("--flux", str(options.amount(asked, "flux", "mass_flux", slope, scales)), *FLUX_RANGE)
+    if given["flux"] is None:
+        return _FLUX
+    return number_in("--flux", str(options.amount(given, "flux", "mass_flux", slope, scales)), *FLUX_RANGE)
 
 
 # --- the server -------------------------------------------------------------------------------------------------------

@@ -159,7 +159,7 @@ function sayJudged(all) {
   const searched = all.map((one) => one.searched).filter(Boolean), s = factor("h"), units = unit("h") || "d";
   const waves = searched.length ? ` Each was held against at least the waves of ${number(Math.max(...searched.map(([low]) => low)) * s, 2)} to ${number(Math.min(...searched.map(([, high]) => high)) * s, 2)} ${units}.` : "";
   const why = all.length && !searched.length ? ` ${sentence(all[0].reason ?? all[0].says)}` : "";
-  return `Stability of ${all.length} flows of the curve${left ? `, ${left} to come` : ""}: ${counts}. Between them nothing is known.${waves}${why}`;
+  return `Stability of ${all.length} ${all.length === 1 ? "flow" : "flows"} of the curve${left ? `, ${left} to come` : ""}: ${counts}. Between them nothing is known.${waves}${why}`;
 }
 
 export function redraw() {

@@ -225,12 +225,12 @@ pins.begin(set, () => {
 story.begin(set);
 if (kept) tellKept(kept.says);
 else map.begin(about, set);
-/** What a page that needs no server is of: beside the flux, or folded away where there is no room. */
+/** What a page that needs no server is of: below the flux, or at the end where there is no room. */
 function tellKept(says) {
-  const words = document.createElement("details");
-  words.open = innerWidth > 700;
-  words.innerHTML = `<summary>What this page is of</summary>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
-  byId("sliders").append(words);
+  const words = document.createElement("section");
+  words.id = "kept-words";
+  words.innerHTML = `<h2>What this page is of</h2>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
+  (innerWidth > 700 ? byId("sliders") : document.querySelector("main")).append(words);
 }
 function redraw() {
   forgetColours();
