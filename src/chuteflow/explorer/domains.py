@@ -46,7 +46,7 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     found = column(place, partial(summary, plane), [*_evenly(_FIRST), *_beside(plane, asked, tolerance)], tolerance)
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
-    if plane.chute.surface == "free":
+    if plane.hot_known:
         hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
         parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(

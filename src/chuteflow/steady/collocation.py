@@ -17,7 +17,16 @@ from functools import cached_property
 
 import numpy as np
 
-from chuteflow.numerics.chebyshev import AnyGrid, Array, grid, interpolation_matrix, piecewise_grid, refinement
+from chuteflow.numerics.chebyshev import (
+    AnyGrid,
+    Array,
+    PiecewiseGrid,
+    grid,
+    interpolation_matrix,
+    piecewise_grid,
+    refinement,
+    singular_weights,
+)
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model
 
 #: The order of the macroscopic quantities: ln Q, ln h, ln M, ln T_surface.
@@ -71,8 +80,28 @@ class Collocation:
         return stretch_map(self.grid.nodes, self.stretch)
 
     @cached_property
+    def height_weights(self) -> Array:
+        """Weights of the integral of P dz: where T has no limit its integrand is a smooth function times s^(-beta)."""
+        g = self.grid
+        if not self.model.unlimited:
+            return g.weights
+        weights, end = g.weights.copy(), self.breaks[1]
+        piece = g.piece if isinstance(g, PiecewiseGrid) else g
+        beta = float(np.real(self.model.beta))
+        weights[: len(piece.nodes)] += end * (singular_weights(piece.degree, beta) - piece.weights)
+        return weights
+
+    @property
     def accumulate(self) -> Array:
         """Matrix (n+1, n+1) that takes g to theta less its surface value."""
+        # Those of many pieces are large: a curve of flows would not fit into memory with one for each.
+        return self._accumulate if self.breaks == WHOLE else self._integral_over_mass()
+
+    @cached_property
+    def _accumulate(self) -> Array:
+        return self._integral_over_mass()
+
+    def _integral_over_mass(self) -> Array:
         return self.grid.integral * self.share[1][..., None, :]
 
     def state(self, z: Array) -> State:
@@ -187,7 +216,7 @@ class State:
             lever = self.laden * np.exp(self.theta - self.f[DENSITY])
         else:
             lever = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
-        return self.problem.grid.weights * self.problem.share[1] * self.mass * lever
+        return self.problem.height_weights * self.problem.share[1] * self.mass * lever
 
     @cached_property
     def _glide_per_work(self) -> Array:

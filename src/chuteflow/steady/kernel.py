@@ -168,7 +168,7 @@ def _assemble(
                 worst = max(worst, abs(local[e, 2 * j + c, 3]) * h)
             # Integrals of P dz and of P du.
             weight = h * gauss[1, j] * w
-            heights = weight * over * math.exp(-math.log(x) - f[DENSITY])
+            heights = h * gauss[2 if e == 0 else 1, j] * w * over * math.exp(-math.log(x) - f[DENSITY])
             log_t = theta + f[GAMMA]
             if beta != 0.0:
                 log_t -= beta * math.log(p)

@@ -29,14 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
 from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import BASES, Base, base
-from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
+from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_height, require_positive
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
@@ -247,11 +246,8 @@ def model(chute: Chute) -> Model:
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)
-    if chute.surface == "free" and dilute_drift(chosen, chute.restitution, chute.slope) >= 0.5:
-        raise InputError(
-            f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
-            "take a larger e, the surface interface or the Fourier form of the closure"
-        )
+    if chute.surface == "free":
+        require_height(chosen, chute.restitution, chute.slope)
     on = base(chute.base)
     return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, on), on)
 

@@ -272,6 +272,19 @@ def require_limit(law: Law, e: float, slope: float, what: str) -> None:
         )
 
 
+def require_height(law: Law, e: float, slope: float) -> None:
+    """Check that the height of the centre of mass is finite on the half-line.
+
+    Raises:
+        InputError: where the temperature grows too fast far above.
+    """
+    if np.any(dilute_drift(law, e, slope) >= 0.5):
+        raise InputError(
+            f"closure {law} at e = {e:g}: T grows so fast far above that h is infinite: "
+            "take a larger e, the surface interface or the Fourier form of the closure"
+        )
+
+
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
     x = np.array([0.0, 0.3, 3.0])
