@@ -11,8 +11,8 @@ import numpy as np
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
 from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion
 from chuteflow.bifurcations.points import BoundaryPoint, solved
-from chuteflow.bifurcations.seeds import FOLDS, HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
+from chuteflow.bifurcations.seeds import FOLDS, HELD, on_grid_of
+from chuteflow.bifurcations.system import Sweep
 from chuteflow.bifurcations.tracing import TracedBoundary, traced
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.families import TracedFamily
@@ -71,8 +71,7 @@ def limits(found: BoundarySet) -> list[Boundary]:
         lines: list[TracedBoundary] = []
         for value, families in zip(found.sampled, found.families, strict=True):
             for solution in _ends(families, condition):
-                w = np.append(solution.z, value)
-                system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+                system, w = on_grid_of(sweep, condition, value, solution)
                 point = solved(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
                     lines.append(traced(point, wider, found.tolerance))

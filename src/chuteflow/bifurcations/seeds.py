@@ -16,7 +16,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion, Local
+from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion
+from chuteflow.bifurcations.grids import carried_to, pinned
 from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
 from chuteflow.bifurcations.system import BoundarySystem, Sweep
 from chuteflow.branches.families import TracedFamily, traced_families
@@ -26,7 +27,7 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.numerics.roots import bisected
-from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition as SolverCondition
 from chuteflow.steady.solver import Solution, resolve
@@ -45,6 +46,8 @@ _FARTHER = 1.5
 #: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
 #: tolerance, and ends where so small a share is left.
 _STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+#: Nodes of the grid of a flow at most.
+MOST_NODES = 640
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
 #: Net loss below this is none.
@@ -90,10 +93,10 @@ def on_families(
     """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
     far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
     for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(family)]
         if isinstance(condition, Fold):
             for turn in family.turns(condition.which, tolerance):
-                if turn.point.solution.problem.breaks == WHOLE:
+                if followed(turn.point.solution):
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
             yield from _zeros(sweep, condition, value, samples, tolerance)
@@ -103,9 +106,14 @@ def on_families(
                 yield point
 
 
-def _in_one_piece(family: TracedFamily) -> list[Solution]:
-    """The flows of a family that one grid resolves: boundaries are followed on such."""
-    return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
+def _among(family: TracedFamily) -> list[Solution]:
+    """The flows of a family that a grid of a few pieces resolves: boundaries are followed on such."""
+    return [solution for solution in family.solutions if followed(solution)]
+
+
+def followed(solution: Solution) -> bool:
+    """Whether boundaries are followed among flows like this one."""
+    return len(solution.problem.grid.nodes) <= MOST_NODES
 
 
 def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
@@ -115,9 +123,17 @@ def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]
 
 def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
     """The point of the boundary at a value of the parameter, from its flow."""
-    w = np.append(solution.z, value)
-    system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+    system, w = on_grid_of(sweep, condition, value, solution)
     return solved(system, w, HELD, value, tolerance)
+
+
+def on_grid_of(
+    sweep: Sweep, condition: Condition, value: float, solution: Solution
+) -> tuple[BoundarySystem, Array]:
+    """The system on the grid of a flow, and the flow on it."""
+    problem, z = pinned(solution.problem, solution.z)
+    w = np.append(z, value)
+    return BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w), w
 
 
 def _zeros(
@@ -169,12 +185,11 @@ def _near(
     sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, sigma: float, tolerance: float
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
-    one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
+    one, other = sorted((first.solution, last.solution), key=lambda s: -len(s.problem.grid.nodes))
     share = 1.0 - sigma if one is last.solution else sigma
-    problem = one.problem
-    _, matrix = other.problem.transferred(problem.degree, problem.stretch)
-    moved = np.concatenate([matrix @ other.z[:-2], other.z[-2:]])
-    w = np.append(one.z + share * (moved - one.z), value)
+    problem, z = pinned(one.problem, one.z)
+    moved = carried_to(other.problem, other.z, problem)
+    w = np.append(z + share * (moved - z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
         point = solved(system, w, HELD, value, tolerance)
@@ -222,8 +237,7 @@ def _beside(
     plane = SolverCondition.plane(chord, solution.macroscopic)
     at = value
     for _ in range(_WALK):
-        w = np.append(solution.z, at)
-        system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+        system, w = on_grid_of(sweep, condition, at, solution)
         ahead = at + shift(system, w, row)
         if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
             return None
@@ -250,9 +264,10 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
 
 
 def _sample(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> _Sample:
-    here, beyond = sweep.models(value)
-    degree, stretch = solution.problem.degree, solution.problem.stretch
-    at = Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
+    problem, z = pinned(solution.problem, solution.z)
+    stretch = float(np.reshape(problem.stretch, ()))
+    system = BoundarySystem(sweep, condition, problem.degree, stretch, problem.breaks, problem.pins)
+    at = system.local(np.append(z, value))
     f, gradient = condition.along_family(at)
     return _Sample(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
@@ -279,13 +294,12 @@ def along_families(
 ) -> Iterator[BoundaryPoint]:
     """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
     for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(family)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             solution = samples[(begin + end) // 2].solution
-            w = np.append(solution.z, value)
-            system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+            system, w = on_grid_of(sweep, condition, value, solution)
             yield through(system, w, tolerance)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Local, along
 from chuteflow.bifurcations.edges import left
+from chuteflow.bifurcations.grids import carried_to
 from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
 from chuteflow.bifurcations.seeds import HELD
 from chuteflow.bifurcations.system import BoundarySystem, Sweep
@@ -303,5 +304,8 @@ def _returned(first: Point[BoundarySystem], before: Point[BoundarySystem], last:
 def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:
     """Unknowns on the grid of another system."""
     value = float(w[-1])
-    _, matrix = system.problem(value).transferred(other.degree, other.stretch)
-    return np.concatenate([matrix @ w[:-3], w[-3:]])
+    if (system.degree, system.stretch, system.breaks, system.pins) == (
+        other.degree, other.stretch, other.breaks, other.pins,
+    ):  # fmt: skip
+        return w
+    return np.append(carried_to(system.problem(value), w[:-1], other.problem(value)), value)

@@ -158,9 +158,10 @@ def interpolation_matrix(g: AnyGrid, points: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def singular_weights(degree: int, beta: float) -> Array:
+def singular_weights(degree: int, beta: complex) -> Array:
     """Weights (n+1,), for values f at the nodes of :func:`grid`, of the integral over [0, 1] of f where f is a polynomial
-    times s^(-beta), 0 <= beta < 1: exact for the polynomial through s^beta f."""
+    times s^(-beta), 0 <= beta < 1: exact for the polynomial through s^beta f; a complex
+    ``beta`` differentiates them."""
     g = grid(degree)
     nodes, weights = np.polynomial.legendre.leggauss(degree + 1)
     # The polynomial times s^(-beta) on intervals that halve towards 0, and on what is left a constant times it.

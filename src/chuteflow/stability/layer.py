@@ -247,11 +247,7 @@ class Layer:
     def _coefficients(self, nu: Array, rate: Array | None = None) -> Coefficients:
         """The coefficients of the law where the shear rate over nu sqrt(T) is ``rate``; without one, those that do
         not depend on it."""
-        room = 1.0 - nu / self.law.densest
-        if rate is not None and self.law.knows_slope:
-            at_shear: Any = self.law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
-            return at_shear(nu, room, self.chute.restitution, rate)
-        return self.law.coefficients(nu, room, self.chute.restitution, self.chute.slope)
+        return self.law.of_density(nu, self.chute.restitution, self.chute.slope, rate)
 
     def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:
         """P_xz and q at the base, and the energy lost to it, (2.9)-(2.15)."""

@@ -224,5 +224,5 @@ def _at_top(base: Base) -> tuple[Coefficients, float]:
     """The coefficients of the law, and sqrt(T), at the top."""
     chute, law = base.flow.chute, base.flow.law
     nu = base.profile.volume_fraction[:1]
-    g = law.coefficients(nu, 1.0 - nu / law.densest, chute.restitution, chute.slope)
+    g = law.of_density(nu, chute.restitution, chute.slope)
     return g, float(np.sqrt(base.profile.granular_temperature[0]))

@@ -44,6 +44,9 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
 UPPER, _PIECES, _DEGREE = 4.2, 200, 7
+#: Closures differ by less than the second number from one side of a break to the other, at this distance in ln x, where
+#: they have no jump.
+_BESIDE, _JUMP = 1e-9, 1e-7
 
 
 def _coordinate(x: Array) -> Array:
@@ -91,10 +94,11 @@ def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
 
-def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
-    """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
+def evaluate_closures(table: Table, x: Array, side: Array | None = None) -> tuple[Array, Array]:
+    """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape; at a
+    break those of the ``side`` on which that x lies, where it is given."""
     inner = np.log1p(x * (1.0 / OFFSET))
-    values, slopes = table(np.log1p(inner))
+    values, slopes = table(np.log1p(inner), None if side is None else _coordinate(side))
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
@@ -172,9 +176,9 @@ class Model:
         """ln T, given Gamma."""
         return theta + gamma if self.beta == 0.0 else theta + gamma - self.beta * log_stress(p)
 
-    def closures(self, x: Array) -> tuple[Array, Array]:
+    def closures(self, x: Array, side: Array | None = None) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
-        return evaluate_closures(self.table, x)
+        return evaluate_closures(self.table, x, side)
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
@@ -198,6 +202,12 @@ class Model:
     def kinks(self) -> Array:
         """ln x at which the closures are not smooth, ascending."""
         return np.log(_argument(np.array(self.table.breaks)))
+
+    @cached_property
+    def kinks_join(self) -> bool:
+        """Whether the closures are continuous there: all but COUPLING are, where g0 has a kink and g4 is not 0."""
+        below, above = (self.closures(np.exp(self.kinks + side))[0][COUPLING] for side in (-_BESIDE, _BESIDE))
+        return bool(np.abs(above - below).max(initial=0.0) < _JUMP)
 
     @cached_property
     def flux_scale(self) -> float:

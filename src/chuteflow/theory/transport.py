@@ -142,11 +142,10 @@ def closures(grains: Grains, nu: Number, rate: Callable[[], Number]) -> list[Num
 
     ``rate`` gives the shear rate over nu sqrt(T); it is asked for where the dissipation of the law depends on it.
     """
-    law, e = grains.law, grains.restitution
+    law, e, slope = grains.law, grains.restitution, grains.slope
     if law.knows_slope:
-        at_shear: Any = law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
-        return apply_two(lambda nu, rate: _table(nu, at_shear(nu, 1.0 - nu / law.densest, e, rate)), nu, rate())
-    return apply(lambda nu: _table(nu, law.coefficients(nu, 1.0 - nu / law.densest, e, grains.slope)), nu)
+        return apply_two(lambda nu, rate: _table(nu, law.of_density(nu, e, slope, rate)), nu, rate())
+    return apply(lambda nu: _table(nu, law.of_density(nu, e, slope)), nu)
 
 
 def _table(nu: Field, g: Coefficients) -> Field:
