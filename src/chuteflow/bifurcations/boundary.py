@@ -148,8 +148,8 @@ class BoundarySet(Result, Sequence[Boundary]):
         if all(followed(solution) for solution in solutions):
             return None
         return (
-            "some deep flows wind more than a grid of few pieces resolves: boundaries among these are not followed, and "
-            "may be missing"
+            "some deep flows wind more than a grid of few pieces resolves: boundaries among these are not followed, "
+            "and may be missing"
         )
 
     def __repr__(self) -> str:

@@ -59,12 +59,12 @@ class Local:
     by_parameter: Array
 
     @classmethod
-    def at(cls, problem: Collocation, stepped: Collocation, z: Array, kinks: Array) -> Local:
-        """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further; ``kinks``
-        (k,) are the derivatives of the pinned kinks with respect to it."""
+    def at(cls, problem: Collocation, stepped: Collocation, z: Array, kinks: Array | None = None) -> Local:
+        """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further;
+        ``kinks`` (k,) are the derivatives of the pinned kinks with respect to it."""
         state, beyond = problem.state(z), stepped.state(z)
         by_parameter = derivative(beyond.residual())
-        if kinks.size:
+        if kinks is not None:
             by_parameter[-len(kinks) :] -= kinks
         return cls(z, state, beyond, state.residual(), state.jacobian(), by_parameter)
 
@@ -206,7 +206,8 @@ class InteriorChange(_OfFields):
         state = at.state
         row = _largest(state.problem.grid, state.net_loss if self.largest else -state.net_loss)
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
-        return float(row @ state.net_loss), by_log_x @ state.log_x_gradient, float(row @ derivative(at.stepped.net_loss))
+        by_parameter = float(row @ derivative(at.stepped.net_loss))
+        return float(row @ state.net_loss), by_log_x @ state.log_x_gradient, by_parameter
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,11 +97,9 @@ def _places(problem: Collocation, z: Array) -> tuple[float, ...]:
 
 
 def _has_moved(problem: Collocation, z: Array) -> bool:
-    moved = np.abs(z[len(problem.grid.nodes) : -2])
     length = np.diff(problem.breaks)
-    return any(
-        far > _MOVED * min(length[index - 1], length[index]) for far, (index, _) in zip(moved, problem.pins, strict=True)
-    )
+    shorter = np.array([min(length[index - 1], length[index]) for index, _ in problem.pins])
+    return bool((np.abs(z[len(problem.grid.nodes) : -2]) > _MOVED * shorter).any())
 
 
 def _reference(problem: Collocation, z: Array, s: Array) -> Array:
@@ -134,7 +132,7 @@ def _crossings(problem: Collocation, z: Array) -> list[tuple[float, int]]:
     for k, kink in enumerate(kinks.tolist()):
         off = level - kink
         # At a pinned break the flow passes: its sign there is rounding.
-        away = np.array([not (pinned_at.get(place) == k) for place in r.tolist()])
+        away = np.array([pinned_at.get(place) != k for place in r.tolist()])
         at, above = r[away], off[away] > 0.0
         for i in np.flatnonzero(above[1:] != above[:-1]).tolist():
             between = [place for place in pinned_at if at[i] <= place <= at[i + 1] and pinned_at[place] == k]
@@ -145,10 +143,15 @@ def _crossings(problem: Collocation, z: Array) -> list[tuple[float, int]]:
         moved = places + np.real(z[len(problem.grid.nodes) : -2]) @ problem.shapes_at(places)[0] if found else places
         found = [(float(place), kink) for place, (_, kink) in zip(moved, found, strict=True)]
     found = [(place, kink) for place, kink in sorted(found) if _SHORTEST < place < 1.0 - _SHORTEST]
-    # A flow that passes a kink for a moment alone does as if it did not.
-    for i in range(len(found) - 1, 0, -1):
-        if i < len(found) and found[i][0] - found[i - 1][0] < _SHORTEST:
+    i = 1
+    while i < len(found):
+        if found[i][0] - found[i - 1][0] > _SHORTEST:
+            i += 1
+        elif found[i][1] == found[i - 1][1]:
+            # A flow that passes a kink for a moment alone does as if it did not.
             del found[i - 1 : i + 1]
+        else:
+            del found[i]
     return found
 
 

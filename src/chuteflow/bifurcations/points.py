@@ -57,7 +57,8 @@ def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance
     refits = _REFITS
     while finer_degrees:
         result = newton(lambda w, system=system: _bordered(system, w, row, value), w, tolerance=_STEP, longest_step=2.0)
-        refitted = system.refitted(result.z) if result.converged and refits else None
+        # Where the start is on a grid for other breaks than the flow there passes, Newton's method does not converge.
+        refitted = system.refitted(result.z if result.converged else w) if refits else None
         if refitted is not None:
             (system, w), refits = refitted, refits - 1
             finer_degrees = [degree for degree in DEGREES if degree > system.degree]

@@ -127,9 +127,7 @@ def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solut
     return solved(system, w, HELD, value, tolerance)
 
 
-def on_grid_of(
-    sweep: Sweep, condition: Condition, value: float, solution: Solution
-) -> tuple[BoundarySystem, Array]:
+def on_grid_of(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> tuple[BoundarySystem, Array]:
     """The system on the grid of a flow, and the flow on it."""
     problem, z = pinned(solution.problem, solution.z)
     w = np.append(z, value)

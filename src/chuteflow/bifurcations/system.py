@@ -72,8 +72,8 @@ def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
 
 @dataclass(frozen=True, eq=False)
 class BoundarySystem:
-    """The steady problem and one condition, on a grid of ``degree`` and ``stretch``, on each piece between ``breaks``, of
-    which there are ``pins``; unknowns (z, lambda).
+    """The steady problem and one condition, on a grid of ``degree`` and ``stretch`` with ``breaks`` and ``pins`` as
+    in :class:`chuteflow.steady.collocation.Collocation`; unknowns (z, lambda).
 
     The inner product is that of the plane (theta at the surface, ln M), with a little of the integral of g^2 over the
     overburden, so that neither resolution nor stretch changes the path, and with the parameter, whose range counts as
@@ -107,17 +107,15 @@ class BoundarySystem:
         """Everything at the unknowns ``w`` (n+4,)."""
         value = float(w[-1])
         here, beyond = self.sweep.models(value)
-        kinks = self._kinks_by_parameter(value) if self.pins else np.empty(0)
+        kinks = self._kinks_by_parameter(value) if self.pins else None
         return Local.at(self._of(here), self._of(beyond), w[:-1], kinks)
 
     def _kinks_by_parameter(self, value: float) -> Array:
         """Derivatives of the pinned ln x with respect to the parameter: breaks are known at real values alone."""
         step = _STEP * (self.sweep.high - self.sweep.low)
         which = [kink for _, kink in self.pins]
-        low, high = (self.sweep.models(value + side)[0].kinks for side in (-step, step))
-        if max(which) >= min(len(low), len(high)):
-            return np.full(len(which), np.nan)
-        return (high[which] - low[which]) / (2.0 * step)
+        low, high = (self.sweep.models(value + side)[0].kinks_at(which) for side in (-step, step))
+        return (high - low) / (2.0 * step)
 
     def residual_and_jacobian(self, w: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""

@@ -35,6 +35,9 @@ _BESIDE, _SAME = 0.3, 1e-6
 _TOLD, _ON_CHORD, _TELLING = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
+#: Steps by which a boundary is carried over a place where a flow comes to a break of the law, at most so often, and by
+#: how much of the step the point may lie beside the tangent.
+_LEAP, _LEAPS, _ASTRAY = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4), 12, 0.5
 #: A parameter that changes less, per arclength, does not change.
 _NO_RATE = 1e-10
 
@@ -126,6 +129,7 @@ class _Side:
     turns: list[Turn] = field(default_factory=list)
     end: str = ""
     closed: bool = False
+    leapt: bool = False
 
 
 def traced(
@@ -163,6 +167,30 @@ def _side(
     notice: Callable[[], object],
 ) -> _Side:
     side = _Side([start])
+    kinked = start.system.problem(start.value).model.kinks.size > 0
+    for _ in range(_LEAPS):
+        if not _followed(side, start, tangent, within, tolerance, control, notice) or not kinked:
+            break
+        # Just where the flow comes to a break of the law, or leaves it, neither grid serves.
+        leapt = _leapt(side, within, tolerance)
+        if leapt is None:
+            break
+        start, tangent = leapt
+        side.leapt = True
+        side.points.append(start)
+    return side
+
+
+def _followed(
+    side: _Side,
+    start: BoundaryPoint,
+    tangent: Array,
+    within: Range,
+    tolerance: float,
+    control: Control,
+    notice: Callable[[], object],
+) -> bool:
+    """Follow a side from ``start`` on; whether it was lost before it came to an end."""
     system = start.system
     path = trace(system, start.w, direction=system.weights * tangent, control=control)
     first = before = next(path, None)
@@ -175,13 +203,38 @@ def _side(
             ended = _extended(side, first, before, point, within, tolerance)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
-            side.end, ended = "it is lost in rounding a little further on", True
+            side.end = "it is lost in rounding a little further on"
+            return True
         if ended:
-            return side
+            return False
         before = point
     corner = path.status is Status.SHARP_TURN and isinstance(system.condition, InteriorChange)
     side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
-    return side
+    return not corner
+
+
+def _leapt(side: _Side, within: Range, tolerance: float) -> tuple[BoundaryPoint, Array] | None:
+    """A point a little further on than a side leads, and the tangent there, if there is one in about its direction."""
+    if len(side.points) < 2:
+        return None
+    before, last = side.points[-2:]
+    system = last.system
+    root = np.sqrt(system.weights[-3:])
+    tangent = system.tangent(last.w)
+    tangent *= np.sign((root**2 * tangent[-3:]) @ (last.w - _carried(before.w, before.system, system))[-3:])
+    tangent /= float(np.linalg.norm(root * tangent[-3:]))
+    for step in _LEAP:
+        w = last.w + step * tangent
+        row = root**2 * tangent[-3:]
+        try:
+            found = solved(system, w, row, float(row @ w[-3:]), tolerance)
+        except SolveError:
+            continue
+        astray = float(np.linalg.norm(root * (found.w[-3:] - w[-3:])))
+        if astray < _ASTRAY * step and within.contains(found.flow.solution.macroscopic):
+            onward = found.system.tangent(found.w)
+            return found, onward * np.sign((root**2 * onward[-3:]) @ tangent[-3:])
+    return None
 
 
 def _extended(
@@ -205,12 +258,24 @@ def _extended(
             side.points.append(reached)
         return True
     _note_turn(side, before, point, tolerance)
-    if len(side.points) > 3 and _returned(first, before, point):
+    if len(side.points) > 3 and not side.leapt and _returned(first, before, point):
         side.end, side.closed = "the boundary closes on itself", True
         return True
     row = (point.system.weights * point.tangent)[-3:]
-    side.points.append(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
+    found = solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance)
+    if point.system.pins and _turned_back(side, found):
+        raise SolveError("a boundary turns back where its flows come to a break of the law")
+    side.points.append(found)
     return False
+
+
+def _turned_back(side: _Side, point: BoundaryPoint) -> bool:
+    """Whether the way to a point leads back against that to the last one."""
+    if len(side.points) < 2:
+        return False
+    root = np.sqrt(point.system.weights[-3:])
+    a, b, c = (root * p.w[-3:] for p in (*side.points[-2:], point))
+    return float((b - a) @ (c - b)) < 0.0
 
 
 def _note_turn(

@@ -159,9 +159,9 @@ def interpolation_matrix(g: AnyGrid, points: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def singular_weights(degree: int, beta: complex) -> Array:
-    """Weights (n+1,), for values f at the nodes of :func:`grid`, of the integral over [0, 1] of f where f is a polynomial
-    times s^(-beta), 0 <= beta < 1: exact for the polynomial through s^beta f; a complex
-    ``beta`` differentiates them."""
+    """Weights (n+1,), for values f at the nodes of :func:`grid`, of the integral of f over [0, 1], where f is a
+    polynomial times s^(-beta), 0 <= beta < 1: exact for the polynomial through s^beta f; a complex ``beta``
+    differentiates them."""
     g = grid(degree)
     nodes, weights = np.polynomial.legendre.leggauss(degree + 1)
     # The polynomial times s^(-beta) on intervals that halve towards 0, and on what is left a constant times it.

@@ -41,8 +41,8 @@ class Table:
         return self.coefficients, self.edges
 
     def __call__(self, x: Array, side: Array | None = None) -> tuple[Array, Array]:
-        """Values and derivatives, each (m,) + x.shape; a complex ``x`` belongs to the piece of its real part, or to that
-        of ``side`` where that is given: at a break there are two."""
+        """Values and derivatives, each (m,) + x.shape; a complex ``x`` belongs to the piece of its real part, or to
+        that of ``side`` where that is given: at a break there are two."""
         degree, pieces, _ = self.coefficients.shape
         scale = pieces / (self.upper - self.lower)
         # fmax and fmin turn a NaN into an end, so that the index exists; whoever made the NaN still has it.

@@ -14,7 +14,8 @@ for exact derivatives: such a break is pinned. The grid coordinate is then a ref
 
     s = r + sum over the pinned breaks k of d_k l_k(r)
 
-with the unknowns d_k and Lagrange's polynomials l_k, which are 1 at their break and 0 at the others, at 0 and at 1.
+with the unknowns d_k and shapes l_k, which are 1 at their break and fall to 0 at the breaks beside it, as cubics
+without slope at either end.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import (
@@ -71,8 +71,8 @@ class Collocation:
 
     A flow too winding for one grid has one of this degree on each piece between ``breaks``; n is the number of nodes
     less one. Unknowns z (n+3,) = (g at the nodes, theta at the surface, ln M); residuals (n+2,): the surface condition,
-    the energy balance at the other nodes, and the base condition. Of the ``pins``, each the index of a break and that of
-    the kink of the model that the flow passes there, there is an unknown before the last two, and a residual at the end.
+    the energy balance at the other nodes, and the base condition. Each of the ``pins``, the index of a break and that
+    of the kink of the model that the flow passes there, has an unknown before the last two, and a residual at the end.
     Many flows are treated at once with
     unknowns (k, n+3) and, where their stretches differ, a ``stretch`` of the shape (k, 1).
     """
@@ -125,16 +125,20 @@ class Collocation:
 
     @cached_property
     def shapes(self) -> tuple[Array, Array]:
-        """The polynomials of the pinned breaks at the nodes, and their derivatives, (k, n+1) each."""
+        """The shapes of the pinned breaks at the nodes, and their derivatives, (k, n+1) each."""
         return self.shapes_at(self.grid.nodes)
 
     def shapes_at(self, r: Array) -> tuple[Array, Array]:
-        """The polynomials of the pinned breaks at places ``r`` (m,), and their derivatives, (k, m) each."""
-        places = [0.0, *(self.breaks[index] for index, _ in self.pins), 1.0]
-        values, slopes = np.empty((len(self.pins), len(r))), np.empty((len(self.pins), len(r)))
-        for k, place in enumerate(places[1:-1]):
-            shape = Polynomial.fromroots([other for other in places if other != place])
-            values[k], slopes[k] = shape(r) / shape(place), shape.deriv()(r) / shape(place)
+        """The shapes of the pinned breaks at places ``r`` (m,), and their derivatives, (k, m) each."""
+        values, slopes = np.zeros((len(self.pins), len(r))), np.zeros((len(self.pins), len(r)))
+        for k, (index, _) in enumerate(self.pins):
+            place = self.breaks[index]
+            for other in (self.breaks[index - 1], self.breaks[index + 1]):
+                t = (r - other) / (place - other)
+                beside = (t > 0.0) & (t <= 1.0)
+                t = t[beside]
+                values[k, beside] = t**2 * (3.0 - 2.0 * t)
+                slopes[k, beside] = 6.0 * t * (1.0 - t) / (place - other)
         return values, slopes
 
     def state(self, z: Array) -> State:
@@ -193,14 +197,14 @@ class State:
     def _side(self) -> Array:
         """An x that tells which side of a break a node is on: the node at a break belongs to the piece above it."""
         side = np.real(self.x).copy()
-        for node, (_, kink) in zip(self.problem.pinned_nodes, self.problem.pins, strict=True):
-            at = float(np.exp(self.problem.model.kinks[kink]))
+        kinks = np.exp(self.problem.model.kinks_at([kink for _, kink in self.problem.pins]))
+        for node, at in zip(self.problem.pinned_nodes, kinks.tolist(), strict=True):
             side[node] = at * (1.0 + _ASIDE if side[node - 1] > at else 1.0 - _ASIDE)
         return side
 
     @cached_property
     def by_pins(self) -> tuple[Array, Array, Array]:
-        """Derivatives (n+1, k) with respect to the unknowns of the pinned breaks: of ln P, of ln dm/dr, and of theta."""
+        """Derivatives (n+1, k) with respect to the unknowns of the pinned breaks: of ln P, ln dm/dr, and theta."""
         problem = self.problem
         (shape, slope), (m, dm) = problem.shapes, self.share
         alpha = max(float(np.reshape(problem.stretch, ())), _PLAIN)
@@ -238,7 +242,7 @@ class State:
     def _off_kinks(self) -> Array:
         model, nodes = self.problem.model, self.problem.pinned_nodes
         log_x = (1.0 + model.beta) * log_stress(self.p[nodes]) - self.theta[nodes]
-        return log_x - model.kinks[[kink for _, kink in self.problem.pins]]
+        return log_x - model.kinks_at([kink for _, kink in self.problem.pins])
 
     def _residual(self) -> Array:
         model = self.problem.model

@@ -57,8 +57,8 @@ _GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()
 
 @lru_cache(maxsize=16)
 def _rule(beta: float) -> Array:
-    """Gauss points, weights, and those for the integral of P dz in the first element (3, STAGES), where its integrand is
-    a smooth function times t^(-beta)."""
+    """Gauss points, weights, and those for the integral of P dz in the first element (3, STAGES), where its integrand
+    is a smooth function times t^(-beta)."""
     moments = 1.0 / (np.arange(1, STAGES + 1) - beta)
     powers = np.arange(STAGES)
     product = np.linalg.solve(_GAUSS[0] ** powers[:, None], moments) * _GAUSS[0] ** beta

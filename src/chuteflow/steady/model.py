@@ -203,6 +203,11 @@ class Model:
         """ln x at which the closures are not smooth, ascending."""
         return np.log(_argument(np.array(self.table.breaks)))
 
+    def kinks_at(self, which: Sequence[int]) -> Array:
+        """Some of the kinks by their index; not a number where there is none."""
+        there = np.append(self.kinks, np.nan)
+        return there[np.minimum(which, len(self.kinks))]
+
     @cached_property
     def kinks_join(self) -> bool:
         """Whether the closures are continuous there: all but COUPLING are, where g0 has a kink and g4 is not 0."""

@@ -206,8 +206,8 @@ class Law:
         return nu, room, self.called(self.coefficients, nu, room, e, slope)
 
     def of_density(self, nu: Field, e: float, slope: float, rate: Field | None = None) -> Coefficients:
-        """The coefficients at ``nu``; of a law that ``knows_slope`` where the shear rate over nu sqrt(T) is ``rate``, if
-        one is given.
+        """The coefficients at ``nu``; of a law that ``knows_slope`` where the shear rate over nu sqrt(T) is ``rate``,
+        if one is given.
 
         Raises:
             InputError: where the law's function fails, naming it and the densities.

@@ -209,7 +209,8 @@ def base_conditions(
 
 
 def richman_exchange(at: Contact, roughness: float, wall_restitution: float, diameter: float) -> tuple[Vector, Number]:
-    """M (2.9) and D (2.15) of hemispheres of a ``diameter``: M_z = P_zz fixes nu chi T, the exclusion factor of (2.10)."""
+    """M (2.9) and D (2.15) of hemispheres of a ``diameter``; M_z = P_zz fixes nu chi T, with the exclusion factor chi
+    of (2.10)."""
     root_T, mean = at.root_temperature, 0.5 * (1.0 + diameter)
     bumps = 1.0 + (WALL_CONTACT / mean) * (1.0 + 0.625 / (at.density * at.radial))  # A(nu) of (2.12)
     # M_i = nu chi T m_i
