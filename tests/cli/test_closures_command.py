@@ -152,6 +152,8 @@ def test_a_coefficient_may_be_a_single_number(capsys, file):
     assert len(single["flows"]) == 3
 
 
+#: These take more than a few seconds.
+SLOW = ("design", "domain", "boundary", "stability", "growth", "neutral")
 #: Commands with a law, without their chute; each ends well.
 COMMANDS = [
     ["solve", *PAPER, "--flux", "3"],
@@ -168,12 +170,40 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(c, marks=pytest.mark.slow if c[0] in SLOW else (), id=c[0]) for c in COMMANDS],
+)
 def test_the_law_of_a_file_gives_the_same_bits_in_every_command(capsys, file, command):
     own, built_in = (answer(capsys, *command, "--closure", closure) for closure in (f"{file}:OWN", "extended"))
     assert own != built_in
     text = json.dumps(own).replace(f"{file}:OWN", "extended").replace('"name": "own"', '"name": "extended"')
     assert json.loads(text) == built_in
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        (["hot"], "has no limit there, which the closed form of hot flows needs"),
+        (
+            ["growth", "--flux", "3", "--size", "4x4"],
+            "has no limit there, which the conditions of disturbed flows need",
+        ),
+        (["neutral", "--size", "4x4"], "has no limit there, which the conditions of disturbed flows need"),
+        (
+            ["relax", "--flux", "3", "--duration", "1"],
+            "has no limit there, which the conditions of disturbed flows need",
+        ),
+    ],
+    ids=lambda value: value[0],
+)
+def test_what_cannot_be_posed_without_a_temperature_far_above_says_why(capsys, command, why):
+    assert main([*command, *PAPER, "--closure", "garzo-dufty"]) == BAD_INPUT
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "T goes like p^(-0.297) far above" in said.err
+    assert why in said.err
+    assert said.err.count("\n") == 1
 
 
 def test_a_file_is_read_again_where_it_has_changed(file, tmp_path):

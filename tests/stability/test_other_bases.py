@@ -46,6 +46,7 @@ def test_the_leading_mode_is_one_of_another_discretisation(flow):
     assert np.minimum(np.abs(rates - sigma), np.abs(rates - sigma.conjugate())).min() < 2e-3 * abs(sigma)
 
 
+@pytest.mark.slow
 def test_a_disturbed_flow_is_followed_and_a_wave_is_told(flow):
     assert np.isfinite([moment.mass_flux for moment in relax(flow, duration=2.0).moments]).all()
     found = stability_of(flow, kx=0.1, ky=0.0)

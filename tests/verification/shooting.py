@@ -1,5 +1,7 @@
-"""Every flow of a chute with a given hold-up, by shooting from the surface down: a scan of surface temperatures, and the
-zeros of what it finds solved by :mod:`.downwards`. Nothing of the program but the coefficients of the laws is used.
+"""Every flow of a chute with a given hold-up, by shooting from the surface down.
+
+A scan of surface temperatures, and the zeros of what it finds solved by :mod:`.downwards`. Nothing of the program but
+the coefficients of the laws is used.
 """
 
 import math

@@ -117,13 +117,13 @@ def random_problem(rng):
     if rng.uniform() < 0.25:
         settings.append("friction=0.05")
     closure = f"{name}:{','.join(settings)}" if settings else name
-    parameters = dict(
-        slope=rng.uniform(0.15, 0.5),
-        restitution=rng.uniform(0.7, 0.98),
-        wall_restitution=rng.uniform(0.5, 1.0),
-        roughness=rng.uniform(0.53, 0.86),
-        surface="interface" if rng.uniform() < 0.25 else "free",
-    )
+    parameters = {
+        "slope": rng.uniform(0.15, 0.5),
+        "restitution": rng.uniform(0.7, 0.98),
+        "wall_restitution": rng.uniform(0.5, 1.0),
+        "roughness": rng.uniform(0.53, 0.86),
+        "surface": "interface" if rng.uniform() < 0.25 else "free",
+    }
     return Chute(**parameters, closure=closure, base=base), float(np.exp(rng.uniform(math.log(0.2), math.log(6.0))))
 
 
