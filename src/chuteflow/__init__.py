@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from chuteflow.sweeps.sweep import sweep
     from chuteflow.theory.laws import closures
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Imported when first asked for, so that the command line starts quickly.
 _HOMES = {

@@ -114,7 +114,7 @@ def death(pool: Executor) -> WorkerError:
             "the workers cannot start: each imports the script that computes in several processes, so put what the "
             'script does under if __name__ == "__main__":, or use one process'
         )
-    return WorkerError("a worker died, perhaps for want of memory: use fewer processes, or give them more memory")
+    return WorkerError("a worker died, perhaps for lack of memory: use fewer processes, or give them more memory")
 
 
 def begin_worker() -> None:

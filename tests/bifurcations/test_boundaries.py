@@ -8,9 +8,9 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, InputError, boundary, curve, flows
-from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion, Local
+from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion, Linearisation
 from chuteflow.bifurcations.regions import count, limits, sides
-from chuteflow.bifurcations.system import Sweep
+from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL
 from chuteflow.steady.collocation import LOG_Q, LOG_T, Collocation
 from chuteflow.steady.hot import hot
@@ -206,14 +206,14 @@ def conditions():
     yield Inversion()
     yield InteriorChange(False)
     yield InteriorChange(True)
-    yield Held(LOG_Q, 0.3)
+    yield FixedQuantity(LOG_Q, 0.3)
 
 
 @pytest.mark.parametrize("second", ["slope", "restitution", "wall_restitution", "roughness"])
 def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, second):
     point = folds[0].traced.points[3]
     value = getattr(point.flow.chute, second)
-    sweep = Sweep(point.flow.chute, second, 0.9 * value, 1.1 * value)
+    sweep = SecondParameter(point.flow.chute, second, 0.9 * value, 1.1 * value)
     degree, stretch = point.system.degree, point.system.stretch
     rng = np.random.default_rng(5)
     z = point.w[:-1] + 1e-3 * rng.standard_normal(len(point.w) - 1)
@@ -222,7 +222,7 @@ def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, sec
 
     def local(z, value):
         here, beyond = sweep.models(value)
-        return Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), z)
+        return Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), z)
 
     base = local(z, value)
     made = [point.system.condition.based(base), *conditions()]
@@ -249,7 +249,7 @@ def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, sec
     [
         ({"of": "fold-h"}, "cannot follow 'fold-h': choose one of fold-Q"),
         ({"second": "surface"}, "unknown second parameter 'surface': choose one of slope"),
-        ({"bounds": (0.4, 0.3)}, "the range must rise"),
+        ({"bounds": (0.4, 0.3)}, "the range must increase"),
         ({"bounds": (-0.1, 0.3)}, "slope"),
         ({"samples": 1}, "samples = 1: must be from 2 to 1000"),
         ({"tolerance": 1.0}, "tolerance 1: must be from"),

@@ -6,7 +6,7 @@ import pytest
 from chuteflow import Chute, boundary, curve
 from chuteflow.bifurcations.grids import pinned
 from chuteflow.numerics.complex_step import derivative, stepped
-from chuteflow.steady.solver import Status
+from chuteflow.steady.solver import SolverStatus
 
 GRAINS = {"restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
 
@@ -43,7 +43,7 @@ def test_folds_are_followed_from_end_to_end_and_are_those_of_curves(chute, bound
 def test_pinned_breaks_have_exact_derivatives():
     """A flow that passes two breaks of its law: Jacobian and gradients against complex steps."""
     found = curve(Chute(0.3, **GRAINS, closure="extended"), points=12).branches[0].flows[-3]
-    assert found.solution.status is Status.CONVERGED
+    assert found.solution.status is SolverStatus.CONVERGED
     problem, z = pinned(found.solution.problem, found.solution.z)
     assert len(problem.pins) >= 2
     assert np.abs(problem.state(z).residual()).max() < 1e-9

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, flows
-from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import Chord, turns
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.rough_turns import dips, may_turn
+from chuteflow.branches.solution_branches import trace_branches
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
 from chuteflow.steady.model import model
@@ -22,8 +22,8 @@ FOLDS = {1e-5: (897.18333, 897.193459), 3e-5: (899.026048, 899.078891), 1e-3: (9
 
 
 def branches(chute):
-    within = Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
-    return traced_families(model(chute), within)
+    within = SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    return trace_branches(model(chute), within)
 
 
 def reached(chord, sigma):
@@ -97,8 +97,8 @@ def test_special_points_are_the_same_for_ten_points_and_for_four_thousand():
                 # The position is that of the flow just before it.
                 for point, branch in ((one, few), (other, many)):
                     mass = np.log(branch.mass_holdup / point.flow.mass_holdup)
-                    warmth = np.log(branch.surface_temperature / point.flow.surface_temperature)
-                    assert np.argmin(np.hypot(mass, warmth)) - point.position in (0, 1)
+                    log_temperature = np.log(branch.surface_temperature / point.flow.surface_temperature)
+                    assert np.argmin(np.hypot(mass, log_temperature)) - point.position in (0, 1)
 
 
 def test_four_flows_of_one_flux_between_two_folds_past_a_cusp():
@@ -200,7 +200,7 @@ def test_flows_on_both_sides_of_a_turn_that_rough_flows_put_elsewhere():
 
 
 def test_a_flow_between_the_edge_of_the_range_and_a_rough_end_is_not_lost():
-    # Q turns at T = 0.00103567; the range ends at 0.001, and the rough end of the family lies a percent inside it.
+    # Q turns at T = 0.00103567; the range ends at 0.001, and the rough end of the branch lies a percent inside it.
     chute = Chute(0.1980454992720526, 0.8295696341995824, 0.5950206565393283, 0.5242155716627819, surface="interface")
     found = flows(chute, Q=5.079250231686532e-05)
     assert [flow.surface_temperature for flow in found] == pytest.approx([0.0010596683, 0.0010142], rel=4e-3)

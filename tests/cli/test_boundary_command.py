@@ -109,7 +109,7 @@ def test_nothing_to_draw_is_drawn_with_its_reason(capsys, tmp_path):
     line = ["--of", "fold-M", "--slope", "0.29:0.3", *MATERIAL, "--samples", "2", "--plot", str(picture)]
     code, out, _ = run(capsys, *line)
     assert code == 0
-    assert "no boundary: no family of flows in the range searched has a point of the kind fold-M" in out
+    assert "no boundary: no branch of flows in the range searched has a point of the kind fold-M" in out
     assert picture.exists()
 
 
@@ -119,7 +119,7 @@ def test_nothing_to_draw_is_drawn_with_its_reason(capsys, tmp_path):
         (["--slope", "0.2:0.4", "--e", "0.8", "--ew", "0.8"], "missing --roughness"),
         (["--slope", "0.3", *MATERIAL], "--slope is 0.3: the second parameter takes a range LO:HI"),
         ([*MATERIAL], "--slope is missing: the second parameter takes a range"),
-        (["--slope", "0.4:0.3", *MATERIAL], "the range must rise"),
+        (["--slope", "0.4:0.3", *MATERIAL], "the range must increase"),
         (["--slope", "0.3:x", *MATERIAL], "'0.3:x' is not a range"),
         (["--slope", "0.2:0.4", "--e", "0.7:0.8", "--ew", "0.8", "--roughness", "0.6"], "only --slope takes a range"),
         (["--of", "fold-h", "--slope", "0.2:0.4", *MATERIAL], "fold-h"),

@@ -111,7 +111,7 @@ def test_a_law_of_a_file_gives_the_same_bits(capsys, file):
         ("FLUX", "has no nu g4 that makes sense at restitution e = 0.8: it is nan at nu = 0"),
         ("FOUR", "its function fails at nu from 0 to 0.62, e = 0.8: TypeError"),
         ("PACKED", "its densest packing is '0.62': must be a number above 0, at most 1"),
-        ("BREAKS", "its breaks fail at e = 0.8, slope = 0.3: ZeroDivisionError"),
+        ("BREAKS", "its breaks fail at e = 0.8, slope ="),
         ("BEYOND", "has a break at nu = 0.7: must be above 0 and below 0.62"),
         ("NOTHING", "its function returns a NoneType: must be Coefficients"),
         ("NUMBER", "'NUMBER' is a int; its laws are"),

@@ -187,7 +187,7 @@ def test_plot_and_save(capsys, tmp_path):
         (["solve", *PAPER, "--flux", "3", "--surface", "wavy"], "unknown surface 'wavy'"),
         (["solve", *PAPER, "--flux", "3", "--tolerance", "2"], "tolerance 2"),
         (["solve", *PAPER, "--flux", "3", "--search-temperature", "5"], "'5' is not a range"),
-        (["solve", *PAPER, "--flux", "3", "--search-temperature", "5:1"], "must rise"),
+        (["solve", *PAPER, "--flux", "3", "--search-temperature", "5:1"], "must increase"),
         (["solve", *PAPER, "--flux", "3", "--largest-holdup", "-1"], "hold-up"),
         (["solve", *PAPER, "--flux", "3", "--diameter", "1 mm"], "--density is missing"),
         (["solve", *PAPER, "--flux", "3", "--diameter", "1 s", "--density", "2500"], "'s' is not a unit like m"),

@@ -45,7 +45,7 @@ def test_the_table_has_the_changes_and_the_stretches_in_words(capsys):
     ]
 
 
-def test_json_has_the_special_points_and_the_judged_flows(capsys):
+def test_json_has_the_special_points_and_the_examined_flows(capsys):
     assert run(f"{CURVE} --stability --samples 10 --json") == 0
     (branch,) = json.loads(capsys.readouterr().out)["branches"]
     changes = [point for point in branch["special"] if point["kind"] == "stability-change"]

@@ -61,7 +61,7 @@ def test_the_first_range_is_on_the_horizontal_axis(capsys):
 def test_text_says_what_was_found_and_how_well(capsys):
     assert main(["domain", *AXES, *REST, "--temperature", "10"]) == 0
     printed = capsys.readouterr().out
-    for words in ("share of the plane", "flow at T = 10", "located to 0.05", "searched: T_surface"):
+    for words in ("fraction of the plane", "flow at T = 10", "located to 0.05", "searched: T_surface"):
         assert words in printed
 
 
@@ -142,7 +142,7 @@ def test_the_picture_names_what_is_there(found):
         ([*AXES, *REST[:4], "--temperature", "1,hot"], "not a number"),
         ([*AXES, *REST[:4], "--tolerance", "1"], "tolerance"),
         ([*AXES, *REST[:4], "--plot", "map.gif"], "must end in"),
-        (["--ew", "0.9:0.7", *AXES[2:], *REST], "must rise"),
+        (["--ew", "0.9:0.7", *AXES[2:], *REST], "must increase"),
         (["--ew", "0.7:1.7", *AXES[2:], *REST], "wall restitution"),
     ],
 )

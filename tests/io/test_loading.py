@@ -11,8 +11,8 @@ import pytest
 from chuteflow import Chute, Domain, InputError, curve, flows, load, save
 from chuteflow.io import contract
 from chuteflow.io.records import checksum
-from chuteflow.maps.columns import Column, Part
-from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane
+from chuteflow.maps.columns import Column, PiecewiseConstant
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 SUFFIXES = [".nc", ".csv", ".json"]
@@ -132,7 +132,7 @@ CHANGES = {
     "a stretch without end": (of_row("stretch", 1e300), "the stretch of a flow"),
     "a negative branch": (of_row("branch", -1), "the branch of a flow = -1"),
     "a slope that is no number": (lambda head, rows: head["chute"].update(slope="steep"), "slope = 'steep'"),
-    "a range that falls": (lambda head, rows: head["searched"].update(surface_temperature=[2.0, 1.0]), "must rise"),
+    "a range that falls": (lambda head, rows: head["searched"].update(surface_temperature=[2.0, 1.0]), "must increase"),
     "a range without end": (lambda head, rows: head["searched"].update(largest_holdup=1e9), "largest hold-up"),
     "a reason that is a number": (of_head("reason", 3), "reason = 3"),
     "a result of no kind": (of_head("kind", "river"), "unknown kind of result, 'river'"),
@@ -249,9 +249,11 @@ def test_a_file_may_claim_any_size(tmp_path):
 
 @pytest.fixture
 def small_domain():
-    plane = Plane(Axis("wall_restitution", 0.5, 0.9), Axis("roughness", 0.55, 0.7), PAPER, ())
-    columns = tuple(Column(place, (Part((0.5,), (0, 1)),) * len(CODES)) for place in (0.0, 1.0))
-    hot = tuple(Column(place, (Part((), (1,)),) * len(HOT_CODES)) for place in (0.0, 1.0))
+    plane = ParameterPlane(
+        ParameterAxis("wall_restitution", 0.5, 0.9), ParameterAxis("roughness", 0.55, 0.7), PAPER, ()
+    )
+    columns = tuple(Column(place, (PiecewiseConstant((0.5,), (0, 1)),) * len(CODES)) for place in (0.0, 1.0))
+    hot = tuple(Column(place, (PiecewiseConstant((), (1,)),) * len(HOT_CODES)) for place in (0.0, 1.0))
     return Domain.on_cells(plane, (3, 3), 0.05, columns, hot)
 
 
@@ -262,11 +264,11 @@ def small_domain():
         ({"size": [10**9, 3]}, "size 1000000000x3"),
         ({"tolerance": 0.5}, "tolerance = 0.5"),
         ({"tolerance": -1}, "tolerance = -1"),
-        ({"axes": [["slope", 0.4, 0.3], ["roughness", 0.5, 0.6]]}, "must rise"),
+        ({"axes": [["slope", 0.4, 0.3], ["roughness", 0.5, 0.6]]}, "must increase"),
         ({"columns": [[0.0, []], [1.0, []]]}, "a column must have"),
         ({"columns": [[0.0, [[[0.5], [0]]]]]}, "one class more than stops"),
-        ({"columns": [[2.0, []]]}, "a share of an axis = 2"),
-        ({"columns": [[0.5, []], [0.5, []]]}, "must rise"),
+        ({"columns": [[2.0, []]]}, "a fraction of an axis = 2"),
+        ({"columns": [[0.5, []], [0.5, []]]}, "must increase"),
         ({"temperatures": ["hot"]}, "temperatures = 'hot'"),
         ({"format": 0}, "format = 0"),
         ({"law": [1.0]}, "another law"),

@@ -14,7 +14,7 @@ from chuteflow.errors import InputError
 from chuteflow.paper.claims import (
     CLAIMS,
     VERDICTS,
-    Verdict,
+    ClaimResult,
     check,
     domains,
     far_field,
@@ -89,7 +89,7 @@ NUMBERS = {
 
 
 @pytest.fixture(scope="module")
-def timed() -> dict[str, tuple[Verdict, float]]:
+def timed() -> dict[str, tuple[ClaimResult, float]]:
     """All of them, computed once, with the processor time that each took."""
     found, begin = {}, time.process_time()
     for verdict in check():
@@ -99,7 +99,7 @@ def timed() -> dict[str, tuple[Verdict, float]]:
 
 
 @pytest.fixture(scope="module")
-def verdicts(timed) -> dict[str, Verdict]:
+def verdicts(timed) -> dict[str, ClaimResult]:
     return {id: verdict for id, (verdict, _) in timed.items()}
 
 

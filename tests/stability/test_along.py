@@ -23,7 +23,7 @@ def verdict(flow, unknown_below=0.0):
     """Stable for surface temperatures from 1 to 2; unstable across above, along below."""
     T = flow.surface_temperature
     if unknown_below > T:
-        raise SolveError("the finest grids do not tell")
+        raise SolveError("the finest grids do not resolve it")
     mode = SimpleNamespace(direction="across" if T > 1.5 else "along", growth=0.01)
     return SimpleNamespace(stable=1.0 < T < 2.0, mode=mode)
 

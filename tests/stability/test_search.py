@@ -22,7 +22,7 @@ STEEP = Chute(0.568, 0.627, 0.478, 0.847)
         pytest.param(STEEP, 8.5, 0, 0.0041611, (0.004704, 0.032544), marks=pytest.mark.slow),
         pytest.param(STEEP, 9.5, 0, 0.0094762, (0.004997, 0.042771), marks=pytest.mark.slow),
         (Chute(0.536202, 0.675958, 0.482668, 0.800872), 13.198687, 1, 0.00808, (0.003333, 0.027242)),
-        # Two modes cross at kx = 0, and the climb from beside it ends in the other one.
+        # Two modes cross at kx = 0, and the maximisation from beside it ends in the other one.
         pytest.param(Chute(0.461, 0.605, 0.577, 0.566), 3.508, 0, 0.134356, (0.0, 0.05287), marks=pytest.mark.slow),
     ],
 )
@@ -60,7 +60,7 @@ def test_the_fastest_wave_is_that_of_a_map_by_brute_force(which):
         assert not found.grows or (found.mode is not None and found.mode.direction == "uniform")
         return
     assert found.mode is not None
-    assert found.mode.growth > (1.0 - 1e-3) * max(peak.growth, peak.summit)
+    assert found.mode.growth > (1.0 - 1e-3) * max(peak.growth, peak.maximum)
 
 
 def test_the_derivatives_of_an_eigenvalue_are_those_of_differences(disturbances):

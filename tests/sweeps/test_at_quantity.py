@@ -1,4 +1,4 @@
-"""Sweeps at a given quantity lose none of the flows near turns that the search by families finds."""
+"""Sweeps at a given quantity lose none of the flows near turns that the search by branches finds."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_just_past_a_cusp_no_lane_is_settled_with_flows_missing():
 
 @pytest.mark.slow
 def test_near_folds_settled_lanes_have_the_flows_of_the_search_by_families():
-    # Deeper families that live between two columns alone are a matter of the search, not of turns.
+    # Deeper branches that live between two columns alone are a matter of the search, not of turns.
     shallow = 4.0
     random = np.random.default_rng(5)
     parameters, fluxes = [], []

@@ -9,8 +9,8 @@ import pytest
 
 from chuteflow.errors import InputError
 from chuteflow.steady.quantities import NUMBERS
-from chuteflow.sweeps.judged import JUDGED_NUMBERS
-from chuteflow.sweeps.outcome import Status
+from chuteflow.sweeps.outcome import PointStatus
+from chuteflow.sweeps.stability import STABILITY_NUMBERS
 from chuteflow.sweeps.study import KINDS, from_canonical, from_dict, read
 
 FIXED = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "T_surface": 1.0}
@@ -145,7 +145,7 @@ def test_a_study_comes_back_from_its_canonical_form():
     [
         ({"slope": -0.3}, "parameters.slope reaches -0.3: must be from 1e-08 to 10000"),
         ({"slope": {"from": 0.2, "to": 0.4}}, "parameters.slope.points is missing: a product needs the number"),
-        ({"slope": {"from": 0.4, "to": 0.2, "points": 3}}, "parameters.slope from 0.4 to 0.2: must rise"),
+        ({"slope": {"from": 0.4, "to": 0.2, "points": 3}}, "parameters.slope from 0.4 to 0.2: must increase"),
         ({"slope": {"from": 0.2, "points": 3}}, "parameters.slope.to is missing: a range has from and to"),
         (
             {"slope": {"from": 0.2, "to": 0.3, "points": 1}},
@@ -171,7 +171,7 @@ def test_a_study_comes_back_from_its_canonical_form():
         ({"results": {"chunk": 1.5}}, "results.chunk = 1.5: must be a whole number"),
         ({"results": {"file": "x"}}, "unknown key results.file: choose from quantities, flows, chunk"),
         ({"search": {"tolerance": 0.1}}, "search.tolerance = 0.1: must be a number from 1e-10 to 0.001"),
-        ({"search": {"surface_temperature": [10, 1]}}, "surface temperatures from 10 to 1: must rise"),
+        ({"search": {"surface_temperature": [10, 1]}}, "surface temperatures from 10 to 1: must increase"),
         ({"search": {"surface_temperature": 3}}, r"search.surface_temperature = 3: must be two numbers, \[low, high\]"),
         ({"kind": "grid"}, "design.kind = 'grid': choose one of product, random, sobol, list"),
         ({"kind": "random"}, "design.points is missing: must be a whole number from 1"),
@@ -236,5 +236,5 @@ def test_the_study_of_the_documents_is_a_study(tmp_path):
     assert one.points == 20000
     assert one.chunks == 3
     # Every quantity that can be kept is named.
-    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS, *JUDGED_NUMBERS))
-    assert all(f"{status.value} `{status.name.lower()}`" in page for status in Status)
+    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS, *STABILITY_NUMBERS))
+    assert all(f"{status.value} `{status.name.lower()}`" in page for status in PointStatus)

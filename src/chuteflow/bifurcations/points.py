@@ -18,7 +18,7 @@ from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.solver import Solution, Status
+from chuteflow.steady.solver import Solution, SolverStatus
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
 _STEP = 1e-7
@@ -102,7 +102,7 @@ def as_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     chute = system.sweep.chute_at(float(w[-1]))
     problem = system.problem(float(w[-1]))
     problem, z = unpinned(replace(problem, model=replace(problem.model, chute=chute)), w[:-1])
-    solution = Solution(problem.state(z).macroscopic(), error, Status.CONVERGED, (problem, z))
+    solution = Solution(problem.state(z).macroscopic(), error, SolverStatus.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 
 

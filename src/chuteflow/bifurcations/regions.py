@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
-from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion
+from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
 from chuteflow.bifurcations.points import BoundaryPoint, solved
 from chuteflow.bifurcations.seeds import FOLDS, HELD, on_grid_of
-from chuteflow.bifurcations.system import Sweep
+from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import TracedBoundary, traced
 from chuteflow.branches.enumeration import flows
-from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import solve_each
@@ -26,7 +26,7 @@ from chuteflow.steady.solver import Solution
 
 #: The argument of :func:`chuteflow.flows` that holds the quantity which folds.
 _ARGUMENTS = {"fold-Q": "Q", "fold-M": "M", "fold-T": "T_surface"}
-#: A family ends at an edge of the range if it comes as near to it in the logarithm.
+#: A branch ends at an edge of the range if it comes as near to it in the logarithm.
 _AT_EDGE = 1e-6
 #: A limit of the range is followed as far beyond it as this factor, for it to be inside.
 _BEYOND = 10.0
@@ -53,24 +53,24 @@ def count(found: BoundarySet, value: float, quantity: float) -> int:
 
 
 def limits(found: BoundarySet) -> list[Boundary]:
-    """The edges of the range searched, as far as families of flows end there: the flows of the largest and smallest
+    """The edges of the range searched, as far as branches of flows end there: the flows of the largest and smallest
     surface temperature and of the largest hold-up, followed through the second parameter.
 
     Raises:
         SolveError: where one could not be followed.
     """
-    sweep = Sweep(found.chute, found.second, *found.bounds)
-    within = Range.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
+    sweep = SecondParameter(found.chute, found.second, *found.bounds)
+    within = SearchRange.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
     edges = (
-        (Held(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
-        (Held(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
-        (Held(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
+        (FixedQuantity(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
+        (FixedQuantity(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
+        (FixedQuantity(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
     )
     out: list[Boundary] = []
     for condition, wider in edges:
         lines: list[TracedBoundary] = []
-        for value, families in zip(found.sampled, found.families, strict=True):
-            for solution in _ends(families, condition):
+        for value, branches in zip(found.sampled, found.families, strict=True):
+            for solution in _ends(branches, condition):
                 system, w = on_grid_of(sweep, condition, value, solution)
                 point = solved(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
@@ -79,9 +79,9 @@ def limits(found: BoundarySet) -> list[Boundary]:
     return out
 
 
-def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solution]:
-    for family in families:
-        for solution in (family.solutions[0], family.solutions[-1]):
+def _ends(branches: tuple[TracedBranch, ...], condition: FixedQuantity) -> Iterator[Solution]:
+    for branch in branches:
+        for solution in (branch.solutions[0], branch.solutions[-1]):
             if abs(float(solution.macroscopic[condition.which]) - condition.value) < _AT_EDGE:
                 yield solution
 

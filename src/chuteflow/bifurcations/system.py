@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Local
+from chuteflow.bifurcations.conditions import Linearisation, TestFunction
 from chuteflow.bifurcations.grids import carried_to, fitted
 from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.steady.chute import Chute
@@ -37,7 +37,7 @@ _STRETCH_OFF = 0.3
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SecondParameter:
     """The second parameter of a chute: its ``name`` in Chute, and the range ``low`` to ``high``."""
 
     chute: Chute
@@ -65,7 +65,7 @@ class Sweep:
 
 
 @lru_cache(maxsize=8)
-def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
+def _models(sweep: SecondParameter, registered: Law, value: float) -> tuple[Model, Model]:
     del registered  # known here to tell what is remembered of one law from that of another
     return model_along(sweep.chute, sweep.name, value)
 
@@ -80,8 +80,8 @@ class BoundarySystem:
     much as a factor of e^6 in T_surface or M.
     """
 
-    sweep: Sweep
-    condition: Condition
+    sweep: SecondParameter
+    condition: TestFunction
     degree: int
     stretch: float
     breaks: tuple[float, ...] = WHOLE
@@ -103,12 +103,12 @@ class BoundarySystem:
     def _of(self, model: Model) -> Collocation:
         return Collocation(model, self.degree, self.stretch, self.breaks, self.pins)
 
-    def local(self, w: Array) -> Local:
+    def local(self, w: Array) -> Linearisation:
         """Everything at the unknowns ``w`` (n+4,)."""
         value = float(w[-1])
         here, beyond = self.sweep.models(value)
         kinks = self._kinks_by_parameter(value) if self.pins else None
-        return Local.at(self._of(here), self._of(beyond), w[:-1], kinks)
+        return Linearisation.at(self._of(here), self._of(beyond), w[:-1], kinks)
 
     def _kinks_by_parameter(self, value: float) -> Array:
         """Derivatives of the pinned ln x with respect to the parameter: breaks are known at real values alone."""

@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Fold, InteriorChange, Local, along
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
 from chuteflow.bifurcations.edges import left
 from chuteflow.bifurcations.grids import carried_to
 from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
-from chuteflow.bifurcations.seeds import HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.branches.ranges import Range
+from chuteflow.bifurcations.starting_points import HELD
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative
-from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, locate, trace
+from chuteflow.numerics.following import Event, Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.elements import DEGREES
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
+CONTROL = ContinuationSettings(
+    initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000
+)
 #: A boundary is closed where it passes its start within this part of the step, in about its direction.
 _CLOSE, _ALONG = 0.05, 0.9
-#: Below this share of the quantity in the null vector, the family itself is singular.
+#: Below this fraction of the quantity in the null vector, the branch itself is singular.
 _SINGULAR = 1e-5
 #: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
 _BESIDE, _SAME = 0.3, 1e-6
 #: To tell whether points are the same they are solved to this; where even that fails, what lies within this part of a
 #: chord's length beside it is on the line; and so many points of a line tell whether it is a known one.
-_TOLD, _ON_CHORD, _TELLING = 1e-7, 1e-3, 5
+_ROUGHLY, _ON_CHORD, _SAMPLED = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
 #: Steps by which a boundary is carried over a place where a flow comes to a break of the law, at most so often, and by
@@ -42,20 +45,11 @@ _LEAP, _LEAPS, _ASTRAY = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4), 12, 0.
 _NO_RATE = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """A turning point in the second parameter: its ``kind``, one of TURNS, and the index of the point before it."""
-
-    kind: str
-    point: BoundaryPoint
-    position: int
-
-
 #: Kinds of turning points, and what they are.
 TURNS = {
     "cusp": "two folds meet: three flows become one",
-    "birth": "a closed family of flows shrinks to a point",
-    "crossing": "two families of flows meet and exchange their ends",
+    "birth": "a closed branch of flows shrinks to a point",
+    "crossing": "two branches of flows meet and exchange their ends",
     "turn": "the boundary turns back in the parameter",
 }
 
@@ -64,9 +58,9 @@ TURNS = {
 class TracedBoundary:
     """A boundary as far as it goes within its range: points in order, turns, and in words why it ends."""
 
-    sweep: Sweep
+    sweep: SecondParameter
     points: tuple[BoundaryPoint, ...]
-    turns: tuple[Turn, ...]
+    turns: tuple[Event[BoundaryPoint], ...]
     ends: tuple[str, str]
 
     def holds(self, point: BoundaryPoint) -> bool:
@@ -83,8 +77,8 @@ class TracedBoundary:
 
     def repeats(self, other: TracedBoundary) -> bool:
         """Whether this is a part of another boundary, or the whole of it."""
-        some = np.linspace(0, len(self.points) - 1, _TELLING + 2)[1:-1].round().astype(int)
-        return sum(other.holds(self.points[i]) for i in some.tolist()) > _TELLING // 2
+        some = np.linspace(0, len(self.points) - 1, _SAMPLED + 2)[1:-1].round().astype(int)
+        return sum(other.holds(self.points[i]) for i in some.tolist()) > _SAMPLED // 2
 
     def at(self, value: float, tolerance: float) -> list[BoundaryPoint]:
         """The points at which the parameter has a ``value``, in order.
@@ -100,8 +94,8 @@ class TracedBoundary:
         out = []
         for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0)).tolist():
             one, other = stops[i][1], stops[i + 1][1]
-            share = off[i] / (off[i] - off[i + 1])
-            w = one.w + share * (_carried(other.w, other.system, one.system) - one.w)
+            fraction = off[i] / (off[i] - off[i + 1])
+            w = one.w + fraction * (_carried(other.w, other.system, one.system) - one.w)
             out.append(solved(one.system, w, HELD, value, tolerance))
         return out
 
@@ -111,7 +105,7 @@ class TracedBoundary:
         system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
-            there = solved(system, w, row, float(row @ point.w[-3:]), _TOLD)
+            there = solved(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
         except SolveError:
             return close
         gap = there.flow.solution.macroscopic - point.flow.solution.macroscopic
@@ -121,22 +115,11 @@ class TracedBoundary:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)
 
 
-@dataclass(eq=False)
-class _Side:
-    """What one side of a boundary is made of, from the start outwards."""
-
-    points: list[BoundaryPoint] = field(default_factory=list)
-    turns: list[Turn] = field(default_factory=list)
-    end: str = ""
-    closed: bool = False
-    leapt: bool = False
-
-
 def traced(
     start: BoundaryPoint,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
     notice: Callable[[], object] = lambda: None,
 ) -> TracedBoundary:
     """The boundary through ``start`` to both sides; ``notice`` is called at each point.
@@ -145,75 +128,74 @@ def traced(
         SolveError: where the start could not be carried on.
     """
     tangent = start.system.tangent(start.w)
-    sweep = start.system.sweep
-    onward = _side(start, tangent, within, tolerance, control, notice)
-    if onward.closed:
-        points = (*onward.points, onward.points[0])
-        return TracedBoundary(sweep, points, tuple(onward.turns), (onward.end, onward.end))
-    back = _side(start, -tangent, within, tolerance, control, notice)
-    last = len(back.points) - 1
-    turns = [Turn(t.kind, t.point, last - 1 - t.position) for t in reversed(back.turns)]
-    turns += [Turn(t.kind, t.point, last + t.position) for t in onward.turns]
-    points = (*back.points[:0:-1], *onward.points)
-    return TracedBoundary(sweep, points, tuple(turns), (back.end, onward.end))
+    found = follow_both_sides(lambda sign: _side(start, sign * tangent, within, tolerance, control, notice))
+    return TracedBoundary(start.system.sweep, found.points, found.events, found.ends)
 
 
 def _side(
     start: BoundaryPoint,
     tangent: Array,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control,
+    control: ContinuationSettings,
     notice: Callable[[], object],
-) -> _Side:
-    side = _Side([start])
+) -> Side[BoundaryPoint]:
+    side = Side(start)
     kinked = start.system.problem(start.value).model.kinks.size > 0
-    for _ in range(_LEAPS):
-        if not _followed(side, start, tangent, within, tolerance, control, notice) or not kinked:
-            break
+    for leaps in range(_LEAPS):
+        lost = _followed(side, start, tangent, within, tolerance, control, notice, closes=leaps == 0)
         # Just where the flow comes to a break of the law, or leaves it, neither grid serves.
-        leapt = _leapt(side, within, tolerance)
+        leapt = _leapt(side, within, tolerance) if lost and kinked else None
         if leapt is None:
             break
         start, tangent = leapt
-        side.leapt = True
-        side.points.append(start)
+        side.add(start)
     return side
 
 
 def _followed(
-    side: _Side,
+    side: Side[BoundaryPoint],
     start: BoundaryPoint,
     tangent: Array,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control,
+    control: ContinuationSettings,
     notice: Callable[[], object],
+    *,
+    closes: bool,
 ) -> bool:
-    """Follow a side from ``start`` on; whether it was lost before it came to an end."""
+    """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to the
+    start again."""
     system = start.system
+    side.stop("")
     path = trace(system, start.w, direction=system.weights * tangent, control=control)
-    first = before = next(path, None)
-    for point in path:
+    first: list[CurvePoint[BoundarySystem]] = []
+    lost: list[bool] = []
+
+    def extend(
+        side: Side[BoundaryPoint], before: CurvePoint[BoundarySystem] | None, point: CurvePoint[BoundarySystem]
+    ) -> None:
+        if before is None:
+            first.append(point)
+            return
         notice()
-        if point.step == 0.0 or first is None or before is None:
-            before = point  # the same point on another grid, or with other borders
-            continue
+        if point.step == 0.0:
+            return  # the same point on another grid, or with other borders
         try:
-            ended = _extended(side, first, before, point, within, tolerance)
+            _extend(side, first[0] if closes else None, before, point, within, tolerance)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
-            side.end = "it is lost in rounding a little further on"
-            return True
-        if ended:
-            return False
-        before = point
-    corner = path.status is Status.SHARP_TURN and isinstance(system.condition, InteriorChange)
-    side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
-    return not corner
+            side.stop("it is lost in rounding a little further on")
+            lost.append(True)
+
+    follow_side(path, side, extend)
+    if path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange):
+        side.stop("the change goes over to another place in the flow, at a corner")
+        return False
+    return bool(lost) or path.status.failed
 
 
-def _leapt(side: _Side, within: Range, tolerance: float) -> tuple[BoundaryPoint, Array] | None:
+def _leapt(side: Side[BoundaryPoint], within: SearchRange, tolerance: float) -> tuple[BoundaryPoint, Array] | None:
     """A point a little further on than a side leads, and the tangent there, if there is one in about its direction."""
     if len(side.points) < 2:
         return None
@@ -237,39 +219,39 @@ def _leapt(side: _Side, within: Range, tolerance: float) -> tuple[BoundaryPoint,
     return None
 
 
-def _extended(
-    side: _Side,
-    first: Point[BoundarySystem],
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
-    within: Range,
+def _extend(
+    side: Side[BoundaryPoint],
+    first: CurvePoint[BoundarySystem] | None,
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
+    within: SearchRange,
     tolerance: float,
-) -> bool:
-    """Add what a step leads to, and tell whether the side ends there.
+) -> None:
+    """Add what a step leads to, and stop the side where it leaves the range or closes.
 
     Raises:
         SolveError: where a point or turning point could not be solved to ``tolerance``.
     """
     edge = left(before, point, within, tolerance)
     if edge is not None:
-        reached, side.end = edge
+        reached, end = edge
         if reached is not None:
-            _note_turn(side, before, point, tolerance, reached)
-            side.points.append(reached)
-        return True
-    _note_turn(side, before, point, tolerance)
-    if len(side.points) > 3 and not side.leapt and _returned(first, before, point):
-        side.end, side.closed = "the boundary closes on itself", True
-        return True
+            _add_turn(side, before, point, tolerance, reached)
+            side.add(reached)
+        side.stop(end)
+        return
+    _add_turn(side, before, point, tolerance)
+    if first is not None and len(side.points) > 3 and _returned(first, before, point):
+        side.stop("the boundary closes on itself", closed=True)
+        return
     row = (point.system.weights * point.tangent)[-3:]
     found = solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance)
     if point.system.pins and _turned_back(side, found):
         raise SolveError("a boundary turns back where its flows come to a break of the law")
-    side.points.append(found)
-    return False
+    side.add(found)
 
 
-def _turned_back(side: _Side, point: BoundaryPoint) -> bool:
+def _turned_back(side: Side[BoundaryPoint], point: BoundaryPoint) -> bool:
     """Whether the way to a point leads back against that to the last one."""
     if len(side.points) < 2:
         return False
@@ -278,10 +260,10 @@ def _turned_back(side: _Side, point: BoundaryPoint) -> bool:
     return float((b - a) @ (c - b)) < 0.0
 
 
-def _note_turn(
-    side: _Side,
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
+def _add_turn(
+    side: Side[BoundaryPoint],
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
     tolerance: float,
     last: BoundaryPoint | None = None,
 ) -> None:
@@ -295,10 +277,10 @@ def _note_turn(
         row = before.system.weights[-3:] * (point.z - before.z)[-3:]
         if row @ turn.w[-3:] > row @ last.w[-3:]:
             return
-    side.turns.append(Turn(_kind(turn), turn, len(side.points) - 1))
+    side.add(turn, _kind(turn))
 
 
-def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) -> BoundaryPoint:
+def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], tolerance: float) -> BoundaryPoint:
     """The turning point between two points, on finer grids until it stays where it is."""
     before, settled = np.full(3, np.inf), np.inf
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
@@ -321,7 +303,7 @@ def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) 
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 
 
-def _corrected(system: BoundarySystem, w: Array, near: Point[BoundarySystem]) -> Point[BoundarySystem]:
+def _corrected(system: BoundarySystem, w: Array, near: CurvePoint[BoundarySystem]) -> CurvePoint[BoundarySystem]:
     """A point of another grid that lies where ``near`` does."""
     direction = np.zeros_like(w)
     direction[-3:] = (near.system.weights * near.tangent)[-3:]
@@ -342,7 +324,7 @@ def _kind(point: BoundaryPoint) -> str:
     return "birth" if _definite(at) else "crossing"
 
 
-def _definite(at: Local) -> bool:
+def _definite(at: Linearisation) -> bool:
     """Whether the parameter has an extremum on the surface of flows over (z, lambda), where F_z loses rank.
 
     Its Hessian on the null space of F_z is that of -psi' F, with psi the left null vector.
@@ -354,16 +336,18 @@ def _definite(at: Local) -> bool:
     return bool(np.linalg.det(hessian) > 0.0)
 
 
-def _returned(first: Point[BoundarySystem], before: Point[BoundarySystem], last: Point[BoundarySystem]) -> bool:
+def _returned(
+    first: CurvePoint[BoundarySystem], before: CurvePoint[BoundarySystem], last: CurvePoint[BoundarySystem]
+) -> bool:
     """Whether the last step passed the first point, in its direction, as far as the last three unknowns show."""
     root = np.sqrt(last.system.weights[-3:])
     a, b, c = (root * p.z[-3:] for p in (first, before, last))
     step = c - b
-    share = float((a - b) @ step) / float(step @ step)
-    beside = float(np.linalg.norm(b + share * step - a)) / float(np.linalg.norm(step))
+    fraction = float((a - b) @ step) / float(step @ step)
+    beside = float(np.linalg.norm(b + fraction * step - a)) / float(np.linalg.norm(step))
     headings = [root * p.tangent[-3:] for p in (first, last)]
     cosine = float(headings[0] @ headings[1]) / float(np.prod([np.linalg.norm(h) for h in headings]))
-    return 0.0 <= share < 1.0 and beside < _CLOSE and cosine > _ALONG
+    return 0.0 <= fraction < 1.0 and beside < _CLOSE and cosine > _ALONG
 
 
 def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:

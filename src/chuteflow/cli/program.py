@@ -99,7 +99,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except ChuteflowError as error:
         return _complain(str(error), FAILED)
     except (click.Abort, KeyboardInterrupt, interrupts.Interrupted) as error:
-        interrupts.told()
+        interrupts.mark_reported()
         Progress().clear()  # of a command that was interrupted
         return _complain(str(error) or "interrupted", interrupts.INTERRUPTED)
     except SystemExit:

@@ -43,7 +43,7 @@ _BOX, _SMALLER_BOX = (12.0, 12.0), (9.0, 9.0)
 
 
 @dataclass(frozen=True)
-class Case:
+class StudyCase:
     """One run of the study: its name, which is that of its folder, its scene and its schedule."""
 
     name: str
@@ -51,7 +51,7 @@ class Case:
     schedule: Schedule = _SCHEDULE
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[StudyCase]:
     """All runs, in the order in which they are done: every chute once before any seed is changed."""
     yield from (_hot(number, 1) for number in range(10))
     yield from (_hot(0, seed) for seed in SEEDS[1:])
@@ -63,30 +63,30 @@ def cases() -> Iterator[Case]:
     yield from (_hot(number, seed, base="random") for seed in SEEDS[1:] for number in RANDOM)
 
 
-def _hot(number: int, seed: int, base: str = "triangular") -> Case:
+def _hot(number: int, seed: int, base: str = "triangular") -> StudyCase:
     e, slope, holdup, roughness = HOT[number]
     box = _BOX if holdup < 2.0 else _SMALLER_BOX
     scene = Scene(Chute(slope, e, e, roughness), holdup, box=box, base=base, seed=seed, bounds=_BOUNDS)
-    return Case(f"hot{number + 1:02d}-{base}-{seed}", scene)
+    return StudyCase(f"hot{number + 1:02d}-{base}-{seed}", scene)
 
 
-def _paper() -> Iterator[Case]:
+def _paper() -> Iterator[StudyCase]:
     for start in ("hot", "cold"):
         for name, holdup in PAPER_HOLDUPS.items():
             scene = Scene(PAPER, holdup, box=_BOX, start=start, bounds=Bounds(restitution=6e-3))
-            yield Case(f"paper-{name}-{start}", scene)
+            yield StudyCase(f"paper-{name}-{start}", scene)
 
 
-def _variations() -> Iterator[Case]:
+def _variations() -> Iterator[StudyCase]:
     """The first chute with contacts twice as stiff, half the time step, and a box of twice the length."""
     first = _hot(0, 1)
     scene = like_theory(first.scene)
-    yield Case("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness))
-    yield Case("finer", replace(scene, bounds=replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)))
-    yield Case("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1])))
+    yield StudyCase("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness))
+    yield StudyCase("finer", replace(scene, bounds=replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)))
+    yield StudyCase("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1])))
 
 
-def prepared(case: Case, folder: str | os.PathLike[str]) -> Run:
+def prepared(case: StudyCase, folder: str | os.PathLike[str]) -> Run:
     """The run of a case in its folder below ``folder``; a hot start begins near the flow of the theory."""
     path = Path(folder) / case.name
     if (path / RECORD).exists():

@@ -19,7 +19,7 @@ from chuteflow.fitting.identifiability import trade_offs
 from chuteflow.fitting.intervals import BetterFit, Interval, interval
 from chuteflow.fitting.measurements import Measurements, Series
 from chuteflow.fitting.objective import LOSSES, Minimum, Objective
-from chuteflow.fitting.residuals import Case, Place
+from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.fitting.starts import at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
@@ -55,7 +55,7 @@ _NEAR = 0.05
 class Estimate:
     """One parameter: its value, standard error and confidence interval.
 
-    ``determined`` tells whether the data end the interval on both sides.
+    ``determined`` is whether the data end the interval on both sides.
     """
 
     key: str
@@ -77,8 +77,8 @@ class Estimate:
         if self.interval.open:
             return f"the data do not determine {self.key}: all values from {low} to {high} fit"
         if self.interval.ends[0] == "crossed":
-            return f"{self.key} is above {low}: the data do not say by how much"
-        return f"{self.key} is below {high}: the data do not say by how much"
+            return f"{self.key} is above {low}: the data do not determine by how much"
+        return f"{self.key} is below {high}: the data do not determine by how much"
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +288,7 @@ def fit(
     parameters = chosen_parameters(chute, free, ranges or {})
     if measured.in_units and any(parameter.key == "slope" for parameter in parameters):
         raise InputError("the slope is free, and makes the measurements dimensionless: give them without units")
-    cases = tuple(Case.of(experiment, chute, parameters) for experiment in measured.experiments)
+    cases = tuple(TrialChute.of(experiment, chute, parameters) for experiment in measured.experiments)
     objective = Objective(cases, base_height, loss)
     _require_enough(objective)
     first = [np.array([parameter.of(chute) for parameter in parameters])]
@@ -307,7 +307,7 @@ def fit(
             best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST, tolerance=_CLOSELY)
             best = best or found.found
     else:
-        raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
+        raise SolveError("the fit keeps improving without converging: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
 
 
@@ -355,7 +355,7 @@ def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objectiv
     of them; and its minimum near ``one``."""
     relaxed = replace(objective, cases=tuple(case.relaxed(error) for case in objective.cases))
     values = one.x[: objective.parameters]
-    places = [Place.of(case, place.flow, values) for case, place in zip(relaxed.cases, one.places, strict=True)]
+    places = [TrialFlow.of(case, place.flow, values) for case, place in zip(relaxed.cases, one.places, strict=True)]
     x = relaxed.start(places)
     if objective.base_unknown:
         x[-len(places) :] = one.x[-len(places) :]
@@ -381,7 +381,7 @@ def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
     values = found.x[: objective.parameters]
     places = []
     for case, place in zip(objective.cases, found.places, strict=True):
-        start = Place.of(case, place.flow, values)
+        start = TrialFlow.of(case, place.flow, values)
         flow = case.followed(start, values, start.label)
         if flow is None:
             return None
@@ -515,7 +515,7 @@ def _outcome(
     )
 
 
-def _fitted(case: Case, place: Place, base: float | None, base_error: float | None) -> Fitted:
+def _fitted(case: TrialChute, place: TrialFlow, base: float | None, base_error: float | None) -> Fitted:
     residual = case.residual(place.flow, base or 0.0)
     profiles, first = [], 0
     for series in case.experiment.profiles:
@@ -525,7 +525,7 @@ def _fitted(case: Case, place: Place, base: float | None, base_error: float | No
     return Fitted(case.experiment.name, place.flow, rank, many, base, base_error, residual, tuple(profiles))
 
 
-def _rank(case: Case, place: Place) -> tuple[int, int]:
+def _rank(case: TrialChute, place: TrialFlow) -> tuple[int, int]:
     """Which of the flows with the same exact number, or the same hold-up, this is."""
     asked: dict[str, Any] = dict(case.experiment.exact) or {"M": place.flow.mass_holdup}
     found = flows(place.flow.chute, **asked, tolerance=1e-6)

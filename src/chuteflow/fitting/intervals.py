@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.fitting.objective import Minimum, Objective
-from chuteflow.fitting.residuals import Place
+from chuteflow.fitting.residuals import TrialFlow
 from chuteflow.numerics.chebyshev import Array
 
 #: How an interval can end, and what that means.
@@ -67,13 +67,13 @@ def interval(objective: Objective, best: Minimum, covariance: Array, which: int,
     Raises:
         BetterFit: where chi2 falls below it on the way.
     """
-    low, low_end = _Side(objective, best, covariance, which, rise, -1.0).end()
-    high, high_end = _Side(objective, best, covariance, which, rise, 1.0).end()
+    low, low_end = _IntervalSide(objective, best, covariance, which, rise, -1.0).end()
+    high, high_end = _IntervalSide(objective, best, covariance, which, rise, 1.0).end()
     return Interval(low, high, (low_end, high_end))
 
 
 @dataclass(eq=False)
-class _Side:
+class _IntervalSide:
     """One side of an interval."""
 
     objective: Objective
@@ -140,19 +140,19 @@ class _Side:
             return here + (inside - here) * min(grown, 5.0)
         if not np.isfinite(outside_root):
             return 0.5 * (inside + outside)
-        share = (goal - inside_root) / (outside_root - inside_root)
-        return inside + float(np.clip(share, 0.05, 0.95)) * (outside - inside)
+        fraction = (goal - inside_root) / (outside_root - inside_root)
+        return inside + float(np.clip(fraction, 0.05, 0.95)) * (outside - inside)
 
     def _fitted(self, value: float, nearest: Minimum) -> Minimum | None:
         """The best fit with the unknown at ``value``: from the nearest known one, the others moved as they go along."""
-        for start, share in ((nearest, 1.0), (nearest, 0.0), (self.best, 1.0)):
+        for start, fraction in ((nearest, 1.0), (nearest, 0.0), (self.best, 1.0)):
             x = start.x.copy()
             spread = self.covariance[self.which, self.which]
-            if share and spread > 0.0:
+            if fraction and spread > 0.0:
                 moved = self.covariance[:, self.which] / spread * (value - x[self.which])
                 x = x + np.where(np.isfinite(moved), moved, 0.0)
             x[self.which] = value
-            places: Sequence[Place] = start.places
+            places: Sequence[TrialFlow] = start.places
             found = self.objective.minimise(x, places, most=_MOST, fixed=self.which, tolerance=_TOLERANCE)
             if found is not None:
                 if found.chi2 < self.best.chi2 - _BETTER * self.rise:

@@ -103,7 +103,7 @@ class Prediction:
 
     @cached_property
     def curve(self) -> Curve:
-        """The families of flows."""
+        """The branches of flows."""
         return curve(self.calibration.chute, points=_POINTS)
 
     @cached_property

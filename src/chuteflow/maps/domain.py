@@ -17,21 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Searched
 from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
 from chuteflow.maps.columns import Classify, Column, between, column, shares_for, to_halve
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
-from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
+from chuteflow.maps.outlines import Outline, Region, boundaries, regions
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, code, hot_code
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
-#: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
+#: Fractions of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
 TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
@@ -53,7 +53,7 @@ class Domain(Result):
     leaves out the chutes: with the interface conditions, and under laws without a temperature far above.
     """
 
-    plane: Plane
+    plane: ParameterPlane
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     tolerance: float
@@ -72,12 +72,12 @@ class Domain(Result):
             for values in (getattr(self, name),)
             for value in np.unique(values)
         ]
-        return display.html_table(repr(self)[1:-1], ["class", "value", "share of the cells"], rows)
+        return display.html_table(repr(self)[1:-1], ["class", "value", "fraction of the cells"], rows)
 
     @classmethod
     def on_cells(
         cls,
-        plane: Plane,
+        plane: ParameterPlane,
         size: tuple[int, int],
         tolerance: float,
         columns: tuple[Column, ...],
@@ -106,12 +106,12 @@ class Domain(Result):
 
     @cached_property
     def families(self) -> NDArray[np.int16]:
-        """The number of families: connected sets of flows in the range searched."""
+        """The number of branches: connected sets of flows in the range searched."""
         return self._named("families")
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
-        """Whether there are hidden families: more than one, so that no continuation from one flow meets all."""
+        """Whether there are hidden branches: more than one, so that no continuation from one flow meets all."""
         return self._named("families") > 1
 
     @cached_property
@@ -132,7 +132,7 @@ class Domain(Result):
         return np.array(layers, dtype=bool).reshape(len(layers), len(self.y), len(self.x))
 
     @cached_property
-    def boundaries(self) -> tuple[Boundary, ...]:
+    def boundaries(self) -> tuple[Outline, ...]:
         """All boundaries between classes, as lines in the plane of the parameters."""
         return boundaries(self.plane, self.columns, self.hot_columns, self.tolerance)
 
@@ -168,8 +168,8 @@ class Domain(Result):
 @np.errstate(under="ignore")
 def domain(
     chute: Chute,
-    x: Axis | tuple[str, float, float],
-    y: Axis | tuple[str, float, float],
+    x: ParameterAxis | tuple[str, float, float],
+    y: ParameterAxis | tuple[str, float, float],
     *,
     size: tuple[int, int] = (400, 400),
     temperatures: Sequence[float] = (),
@@ -187,7 +187,7 @@ def domain(
             value, such as ``("slope", 0.1, 0.5)``.
         size: cells along x and y.
         temperatures: surface temperatures at which flows are looked for too.
-        tolerance: share of an axis to which boundaries are located, from 1e-6 to 0.1.
+        tolerance: fraction of an axis to which boundaries are located, from 1e-6 to 0.1.
         surface_temperature: range searched.
         largest_holdup: range searched.
         workers: processes. With 1 all is done in this one; with more, a script needs the usual
@@ -201,16 +201,18 @@ def domain(
     size = checked_size(size, 1, LARGEST_SIZE)
     tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
-        raise InputError(f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a share of an axis")
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+        raise InputError(
+            f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a fraction of an axis"
+        )
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     temperatures = tuple(number("temperature", t) for t in temperatures)
     for t in temperatures:
         if not within.coldest <= t <= within.hottest:
             raise InputError(
                 f"temperature {t:g}: must be in the range searched, {within.coldest:g} to {within.hottest:g}"
             )
-    x, y = (axis if isinstance(axis, Axis) else Axis(*axis) for axis in (x, y))
-    plane = Plane(x, y, chute, temperatures, within)
+    x, y = (axis if isinstance(axis, ParameterAxis) else ParameterAxis(*axis) for axis in (x, y))
+    plane = ParameterPlane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
         columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
     hot_columns = _hot_columns(plane, tolerance) if plane.hot_known else ()
@@ -224,7 +226,7 @@ def _pool(workers: int) -> AbstractContextManager[Executor | None]:
     return worker_pool(workers) if workers > 1 else nullcontext()
 
 
-def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
+def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
     """Columns as many as it takes, in order along the outer axis."""
     first = _FIRST_COLUMNS if tolerance < 5.0 * TOLERANCE else _FEWEST_COLUMNS
     tasks = [
@@ -253,7 +255,7 @@ def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Pr
 class _Task:
     """A column to work out."""
 
-    plane: Plane
+    plane: ParameterPlane
     place: float
     shares: Sequence[float]
     tolerance: float
@@ -263,7 +265,7 @@ def _column(task: _Task) -> Column:
     return column(task.place, partial(code, task.plane), task.shares, task.tolerance)
 
 
-def _hot_columns(plane: Plane, tolerance: float) -> list[Column]:
+def _hot_columns(plane: ParameterPlane, tolerance: float) -> list[Column]:
     """Columns of what is known in closed form, finer than the others."""
     fine = 0.1 * tolerance
     classify: Classify = partial(hot_code, plane)
@@ -285,7 +287,7 @@ def _gridded(
     outer: NDArray[np.float64],
     inner: NDArray[np.float64],
 ) -> NDArray[np.int16]:
-    """One number of the class at shares of the outer and inner axis, (outer, inner)."""
+    """One number of the class at fractions of the outer and inner axis, (outer, inner)."""
     places = np.array([one.place for one in columns])
     grid = np.empty((len(outer), len(inner)), dtype=np.int16)
     for i, place in enumerate(outer.tolist()):

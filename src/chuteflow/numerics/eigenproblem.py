@@ -18,7 +18,7 @@ from chuteflow.numerics.chebyshev import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-#: Eigenvalues of the inverse below this share of its norm belong to the conditions.
+#: Eigenvalues of the inverse below this fraction of its norm belong to the conditions.
 _VANISHING = 1e-13
 
 

@@ -35,12 +35,12 @@ from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import bases
 from chuteflow.theory.constitutive import Coefficients, Law
-from chuteflow.theory.transport import Contact, Grains
+from chuteflow.theory.transport import Contact, Material
 
 #: Degree of the grid in m.
 DEGREE = 40
 FIELDS = 4
-#: Share of the mass above the highest node, where fields are those of the far field to rounding.
+#: Fraction of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
 #: Densities far above the base fall off to zero.
 _vanishing = np.errstate(under="ignore")
@@ -117,9 +117,10 @@ class Layer:
         """
         if flow.chute.surface != "free":
             raise InputError(
-                "the interface is known for steady flows alone: time needs the free surface, give --surface free"
+                "the interface is known only for steady flows: time dependence needs the free surface, give "
+                "--surface free"
             )
-        Grains(flow.law, flow.chute.restitution, flow.chute.slope)
+        Material(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
         return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
 

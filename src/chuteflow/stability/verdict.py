@@ -24,7 +24,7 @@ from chuteflow.stability.modes import (
     check_wavenumbers,
     leading,
 )
-from chuteflow.stability.search import Fastest, fastest
+from chuteflow.stability.search import FastestMode, fastest
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -50,7 +50,7 @@ class Stability(Result):
     ``stable`` is True or False only if ``complete``: if all directions and all k in ``searched`` (1/d) were searched,
     and disturbances that are the same all along the chute. It is True if no discrete mode of them grows faster than
     ``smallest_rate``, False if one does, and None if none is known to and some are ``unresolved``: wavenumbers
-    (kx, ky) at which the grids do not tell. If wavenumbers were given, ``stable`` is None and ``grows`` says what
+    (kx, ky) at which the grids do not resolve it. If wavenumbers were given, ``stable`` is None and ``grows`` says what
     the wave does. The mass mode at k = 0, which leads to the neighbouring steady flow, is set apart. ``mode`` is None
     where the continuous spectrum, which decays, hides all modes, and where nothing is told. ``examined`` counts the
     wavenumbers of the scan, from whose peaks the maxima are sought.
@@ -122,13 +122,13 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
     )
 
 
-def _single(disturbances: Disturbances, kx: float, ky: float) -> Fastest:
+def _single(disturbances: Disturbances, kx: float, ky: float) -> FastestMode:
     try:
         found = leading(disturbances, kx, ky, count=2, tolerance=TOLERANCE)
     except UnresolvedError:
-        return Fastest(None, ((kx, ky),), 1)
+        return FastestMode(None, ((kx, ky),), 1)
     # At k = 0 the mass mode says nothing of stability.
-    return Fastest(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
+    return FastestMode(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
 
 
 def wavenumbers(flow: Flow) -> tuple[float, float]:
@@ -144,7 +144,7 @@ def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[M
 
     Raises:
         InputError: for wavenumbers out of range, and where stability cannot be posed.
-        SolveError: where an eigenvalue that seems to grow cannot be told on the finest grids.
+        SolveError: where an eigenvalue that seems to grow cannot be decided on the finest grids.
     """
     check_wavenumbers(kx, ky)
     return leading(Disturbances(flow), kx, ky, count=count, tolerance=TOLERANCE)
@@ -154,8 +154,8 @@ def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[M
 class GrowthMap:
     """Growth rates, frequencies and errors of the leading modes over ``kx`` (m,) and ``ky`` (n,), arrays (m, n).
 
-    They are NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n):
-    there the grids do not tell whether something grows.
+    They are NaN where no mode is distinguished from the continuous spectrum, which decays, and where ``unresolved`` (m,
+    n): there the grids do not resolve whether a disturbance grows.
     """
 
     flow: Flow

@@ -1,6 +1,6 @@
 """The discretised steady problem: Chebyshev collocation in the overburden coordinate, exact Jacobian.
 
-# notation: s grid coordinate, m = P/M share of the overburden, theta heat potential, g = dtheta/dm,
+# notation: s grid coordinate, m = P/M fraction of the overburden, theta heat potential, g = dtheta/dm,
 # otherwise as in chuteflow.steady.model.
 
 The unknown field is g at the nodes of a grid on 0 <= s <= 1; with it go theta at the surface and ln M.
@@ -56,7 +56,7 @@ def stretch_map(s: Array, stretch: Array | float) -> tuple[Array, Array]:
 
 
 def stretch_position(m: Array, stretch: Array | float) -> Array:
-    """s at shares m: the inverse of :func:`stretch_map`."""
+    """s at fractions m: the inverse of :func:`stretch_map`."""
     alpha = np.maximum(stretch, _PLAIN)
     return np.log1p(m * np.expm1(alpha)) / alpha
 
@@ -168,17 +168,16 @@ class State:
         self.g = z[..., :nodes]
         self.mass = mass = np.exp(z[..., -1:])
         self.share = m, dm = self._moved(z[nodes:-2]) if problem.pins else problem.share
-        self.accumulate = problem.grid.integral * dm if problem.pins else problem.accumulate
-        self.theta = z[..., -2:-1] + (self.accumulate @ self.g[..., None])[..., 0]
+        self.theta = z[..., -2:-1] + problem.grid.integrate(self.g * dm)
         self.overburden = mass * m
         self.p = p = self.overburden + model.surface_stress
         #: P/p, which is 1 on the half-line
-        self.laden = self.overburden / p if model.surface_stress else np.ones_like(p)
+        self.overburden_fraction = self.overburden / p if model.surface_stress else np.ones_like(p)
         self.x = model.density_argument(p, self.theta)
         self.f, self.df = f, _ = model.closures(self.x, self._side() if problem.pins else None)
         self.y = f[CONDUCTION] * self.g / mass
         self.s_p = 1.0 / (mass * dm)  # ds/dp
-        self.y_p = (self.y @ problem.grid.derivative.T) * self.s_p
+        self.y_p = problem.grid.differentiate(self.y) * self.s_p
         self.rise = p * self.g / mass - model.beta  # p dtheta/dp, less beta
         self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
         self.net_loss = f[LOSS] - model.slope**2 * f[WORK]
@@ -186,6 +185,11 @@ class State:
         self.base_flux = model.base_flux(f[..., -1])
         #: complex where any unknown or parameter is
         self.dtype = np.result_type(self.y, self.base_flux)
+
+    @property
+    def accumulate(self) -> Array:
+        """Matrix (n+1, n+1) that takes g to theta less its surface value."""
+        return self.problem.grid.integral * self.share[1] if self.problem.pins else self.problem.accumulate
 
     def _moved(self, d: Array) -> tuple[Array, Array]:
         """m and dm/dr at the nodes where the pinned breaks are moved by ``d`` (k,)."""
@@ -218,7 +222,7 @@ class State:
     @cached_property
     def log_x_gradient(self) -> Array:
         """Derivative (n+1, n+3) of ln x with respect to z."""
-        raised = (1.0 + self.problem.model.beta) * self.laden
+        raised = (1.0 + self.problem.model.beta) * self.overburden_fraction
         columns = [-self.accumulate, -np.ones((len(raised), 1)), raised[:, None]]
         if self.problem.pins:
             by_m, _, by_theta = self.by_pins
@@ -229,9 +233,13 @@ class State:
     def rise_gradient(self) -> Array:
         """Derivative (n+1, n+3) of the rise with respect to z."""
         steep = self.rise + self.problem.model.beta
-        columns = [np.diag(self.p / self.mass), np.zeros((len(steep), 1)), ((self.laden - 1.0) * steep)[:, None]]
+        columns = [
+            np.diag(self.p / self.mass),
+            np.zeros((len(steep), 1)),
+            ((self.overburden_fraction - 1.0) * steep)[:, None],
+        ]
         if self.problem.pins:
-            columns.insert(1, (self.laden * steep)[:, None] * self.by_pins[0])
+            columns.insert(1, (self.overburden_fraction * steep)[:, None] * self.by_pins[0])
         return np.concatenate(columns, axis=1)
 
     def residual(self) -> Array:
@@ -265,7 +273,7 @@ class State:
         problem, model = self.problem, self.problem.model
         f, df = self.f, self.df[..., None]
         by_m, by_dm, _ = self.by_pins
-        raised = ((1.0 + model.beta) * self.laden)[:, None]
+        raised = ((1.0 + model.beta) * self.overburden_fraction)[:, None]
         log_x, p = raised * by_m - self.by_pins[2], self.p[:, None]
         y = df[CONDUCTION] * (self.g / self.mass)[:, None] * log_x
         y_p = (problem.grid.derivative @ y) * self.s_p[:, None] - self.y_p[:, None] * by_dm
@@ -282,9 +290,9 @@ class State:
 
     def _jacobian(self) -> Array:
         problem, model = self.problem, self.problem.model
-        f, df, p, y, laden = self.f, self.df, self.p, self.y, self.laden
+        f, df, p, y, overburden_fraction = self.f, self.df, self.p, self.y, self.overburden_fraction
         # d ln x / d ln M
-        raised = (1.0 + model.beta) * laden
+        by_mass = (1.0 + model.beta) * overburden_fraction
         n = p.shape[-1]
         nodes = np.arange(n)
         y_log_x = df[CONDUCTION] * self.g / self.mass
@@ -294,7 +302,7 @@ class State:
         np.multiply(-y_log_x[..., None], self.accumulate, out=y_z[..., :n])
         y_z[..., nodes, nodes] += f[CONDUCTION] / self.mass
         y_z[..., n] = -y_log_x
-        y_z[..., n + 1] = y_log_x * raised - y
+        y_z[..., n + 1] = y_log_x * by_mass - y
         heating_log_x = df[COUPLING] * (1.0 - self.rise)
         by_log_x = 0.5 * y * heating_log_x - p * (df[LOSS] - model.slope**2 * df[WORK])
         by_rise = 0.5 * y * (1.0 - f[COUPLING])
@@ -308,21 +316,21 @@ class State:
         body[..., n + 1] += (
             (self.overburden - p) * self.y_p
             - self.overburden * self.net_loss
-            + by_log_x * raised
-            + by_rise * (laden - 1.0) * (self.rise + model.beta)
+            + by_log_x * by_mass
+            + by_rise * (overburden_fraction - 1.0) * (self.rise + model.beta)
         )
         out[..., 0, :] = y_z[..., 0, :]
         base = model.base_flux_slope(df[..., -1])
         out[..., -1, :] = y_z[..., -1, :]
         out[..., -1, :n] += base[..., None] * self.accumulate[..., -1, :]
         out[..., -1, n] += base
-        out[..., -1, n + 1] -= base * raised[..., -1]
+        out[..., -1, n + 1] -= base * by_mass[..., -1]
         return out
 
     def macroscopic(self) -> Array:
         """ln Q, ln h, ln M and ln T_surface, (4,): (3.26) and (3.27) as integrals over the overburden."""
         mass = self.mass[..., 0]
-        flux, moment = self._slip + self._glide.sum(axis=-1), self._heights.sum(axis=-1)
+        flux, moment = self._slip + self._shear_flux.sum(axis=-1), self._heights.sum(axis=-1)
         return np.stack([np.log(flux), np.log(moment / mass), np.log(mass), self.surface], axis=-1)
 
     @property
@@ -335,20 +343,20 @@ class State:
         """Contributions of the nodes to the integral of P dz = (P/nu) dp."""
         model = self.problem.model
         if model.beta == 0.0:
-            lever = self.laden * np.exp(self.theta - self.f[DENSITY])
+            integrand = self.overburden_fraction * np.exp(self.theta - self.f[DENSITY])
         else:
-            lever = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
-        return self.problem.height_weights * self.share[1] * self.mass * lever
+            integrand = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
+        return self.problem.height_weights * self.share[1] * self.mass * integrand
 
     @cached_property
-    def _glide_per_work(self) -> Array:
+    def _shear_flux_per_work(self) -> Array:
         weights = self.problem.grid.weights * self.share[1] * self.mass
         return weights * self.overburden * (self.problem.model.slope * np.exp(0.5 * self.log_t))
 
     @cached_property
-    def _glide(self) -> Array:
+    def _shear_flux(self) -> Array:
         """Contributions to the integral of P du, with du = s (g1/g2) sqrt(T) dp/nu (3.10)."""
-        return self._glide_per_work * self.f[WORK]
+        return self._shear_flux_per_work * self.f[WORK]
 
     @cached_property
     def _slip(self) -> Array:
@@ -358,39 +366,39 @@ class State:
 
     def macroscopic_gradient(self) -> Array:
         """Derivative (4, n+3) of :meth:`macroscopic` with respect to z."""
-        model, df, laden = self.problem.model, self.df, self.laden
+        model, df, overburden_fraction = self.problem.model, self.df, self.overburden_fraction
         n = self.p.shape[-1]
         root_t = 0.5 * (1.0 - df[GAMMA])  # d ln sqrt(T) / dtheta
-        heights, glide = self._heights, self._glide
-        work_part = self._glide_per_work * df[WORK]
-        flux = self._slip + glide.sum(axis=-1)
+        heights, shear_flux = self._heights, self._shear_flux
+        work_part = self._shear_flux_per_work * df[WORK]
+        flux = self._slip + shear_flux.sum(axis=-1)
         moment = heights.sum(axis=-1)
         slip_log_x = model.slip_slope(df[..., -1]) / model.slip(self.f[..., -1])
         end = self._slip / flux
         by_theta = np.empty((*self.p.shape[:-1], 2, n), dtype=self.dtype)
-        by_theta[..., 0, :] = (glide * root_t - work_part) / flux[..., None]
+        by_theta[..., 0, :] = (shear_flux * root_t - work_part) / flux[..., None]
         by_theta[..., 0, -1] += end * (root_t[..., -1] - slip_log_x)
         by_theta[..., 1, :] = heights * (1.0 + df[DENSITY]) / moment[..., None]
         out = np.zeros((*self.p.shape[:-1], 4, n + 2), dtype=self.dtype)
         out[..., :2, :n] = by_theta @ self.accumulate
         out[..., :2, n] = by_theta.sum(axis=-1)
-        raised = (1.0 + model.beta) * laden
-        warmed = df[GAMMA] * raised - model.beta * laden  # d ln T / d ln M
-        glide_move = (glide * (2.0 + 0.5 * warmed) + work_part * raised).sum(axis=-1)
+        by_mass = (1.0 + model.beta) * overburden_fraction
+        warmed = df[GAMMA] * by_mass - model.beta * overburden_fraction  # d ln T / d ln M
+        shear_move = (shear_flux * (2.0 + 0.5 * warmed) + work_part * by_mass).sum(axis=-1)
         by_share = slip_log_x * (1.0 + model.beta) + 0.5 * (df[GAMMA][..., -1] * (1.0 + model.beta) - model.beta)
-        slip_move = 1.0 + by_share * laden[..., -1]
-        out[..., LOG_Q, n + 1] = glide_move / flux + end * slip_move
-        height_move = (heights * (2.0 - raised * (1.0 + df[DENSITY]))).sum(axis=-1)
+        slip_move = 1.0 + by_share * overburden_fraction[..., -1]
+        out[..., LOG_Q, n + 1] = shear_move / flux + end * slip_move
+        height_move = (heights * (2.0 - by_mass * (1.0 + df[DENSITY]))).sum(axis=-1)
         out[..., LOG_H, n + 1] = height_move / moment - 1.0
         out[..., LOG_M, n + 1] = 1.0
         out[..., LOG_T, n] = self.log_t_slope
         if not self.problem.pins:
             return out
         by_m, by_dm, by_theta = self.by_pins
-        log_x = ((1.0 + model.beta) * laden)[:, None] * by_m - by_theta
-        log_t = by_theta + df[GAMMA][:, None] * log_x - model.beta * laden[:, None] * by_m
+        log_x = ((1.0 + model.beta) * overburden_fraction)[:, None] * by_m - by_theta
+        log_t = by_theta + df[GAMMA][:, None] * log_x - model.beta * overburden_fraction[:, None] * by_m
         pins = np.zeros((4, len(self.problem.pins)), dtype=self.dtype)
-        drag = glide @ (by_m + by_dm + 0.5 * log_t) + work_part @ log_x
+        drag = shear_flux @ (by_m + by_dm + 0.5 * log_t) + work_part @ log_x
         pins[LOG_Q] = (drag + self._slip * (slip_log_x * log_x[-1] + 0.5 * log_t[-1])) / flux
         pins[LOG_H] = heights @ (by_m + by_dm - (1.0 + df[DENSITY])[:, None] * log_x) / moment
         return np.concatenate([out[:, :n], pins, out[:, n:]], axis=1)

@@ -35,9 +35,9 @@ _GRADED = 0.4 ** np.arange(12, 0, -1.0)
 _COARSE, _SMOOTH = 0.125 ** np.arange(8, 0, -1.0), 1e-3
 #: A piece of a grid is not shorter than this.
 _APART = 1e-6
-#: Elements at most, and pieces of a grid.
+#: Elements at most of the coarser mesh, and pieces of a grid: no more than elements of the finer mesh.
 MOST_ELEMENTS = 768
-MOST_PIECES = MOST_ELEMENTS // _PER_PIECE + 1
+MOST_PIECES = 2 * MOST_ELEMENTS
 
 
 def _gauss() -> tuple[Array, Array, Array, Array]:
@@ -139,7 +139,11 @@ class Elements:
         if pins.size:
             inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
-        yield problem, self._unknowns(problem)[0]
+        yield problem, self.unknowns(problem)
+
+    def unknowns(self, problem: Collocation) -> Array:
+        """The unknowns on a Chebyshev grid of the same stretch."""
+        return self._unknowns(problem)[0]
 
     def _unknowns(self, problem: Collocation) -> tuple[Array, Array]:
         """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""

@@ -162,7 +162,8 @@ def chosen_parameters(
         parameter = found[keys.index(key)]
         if not parameter.low <= low < high <= parameter.high:
             raise InputError(
-                f"range {low:g} to {high:g} of {key}: must rise, and be within {parameter.low:g} to {parameter.high:g}"
+                f"range {low:g} to {high:g} of {key}: must increase, and be within {parameter.low:g} to "
+                f"{parameter.high:g}"
             )
     return tuple(replace(p, likely=asked[p.key]) if p.key in asked else p for p in found)
 

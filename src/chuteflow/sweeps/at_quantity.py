@@ -23,16 +23,16 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import zeros
 from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
-from chuteflow.sweeps.aligned import Aligned
+from chuteflow.sweeps.aligned import AlignedArrays
 from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
-from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
+from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
 #: Columns per decade of surface temperature to begin with.
 _PER_DECADE = 4
 #: Accuracy of the columns, and for those whose first flow lies above the start.
 _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
-#: Flows kept of a column; a chute with more is left to the search by families.
+#: Flows kept of a column; a chute with more is left to the search by branches.
 _MOST = 12
 #: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
@@ -59,7 +59,7 @@ _MEETS = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
-class Columns(Aligned):
+class ScannedFlows(AlignedArrays):
     """Columns in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
     where that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
 
@@ -68,18 +68,18 @@ class Columns(Aligned):
     count: Indices
     flows: Array
 
-    def joined(self, other: Columns) -> Columns:
+    def joined(self, other: ScannedFlows) -> ScannedFlows:
         """Both in order."""
         both = self.and_all([other])
         return both.take(np.lexsort((both.log_t, both.member)))
 
-    def of(self, members: NDArray[np.bool_]) -> Columns:
+    def of(self, members: NDArray[np.bool_]) -> ScannedFlows:
         """The columns of some members."""
         return self.take(members[self.member])
 
 
 @dataclass(frozen=True, eq=False)
-class Brackets(Aligned):
+class Brackets(AlignedArrays):
     """Flows that lie between two columns: ``member``, ``place`` among the flows from the surface, ends in ln T and the
     ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
 
@@ -103,7 +103,7 @@ class Problem:
     ends: Ends
     deepest: Array
 
-    def columns(self, member: Indices, log_t: Array) -> Columns:
+    def columns(self, member: Indices, log_t: Array) -> ScannedFlows:
         """Rough columns of ``member`` (c,) at ``log_t`` (c,)."""
         found, trouble = self._marched(member, log_t, _ROUGH)
         again = np.flatnonzero(trouble)
@@ -118,7 +118,7 @@ class Problem:
         flows = np.full((member.size, _MOST, 3), np.nan)
         flows[found.member[kept], place[kept]] = found.macroscopic[:LOG_T, kept].T
         count[trouble | (count > _MOST)] = -1
-        return Columns(member, log_t, count, flows)
+        return ScannedFlows(member, log_t, count, flows)
 
     def _marched(self, member: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
         some, temperature = self.batch.take(member), np.exp(log_t)
@@ -175,7 +175,7 @@ def at_quantity(
     return Flows.joined([flows.take(inside)]), unsettled
 
 
-def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
+def _widened(problem: Problem, columns: ScannedFlows, edge: int) -> ScannedFlows:
     """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the range
     towards the value asked for, as :func:`chuteflow.flows` has it."""
     for _ in range(_WIDENINGS):
@@ -201,7 +201,7 @@ def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
     return columns
 
 
-def _deeper(problem: Problem, columns: Columns) -> NDArray[np.bool_]:
+def _deeper(problem: Problem, columns: ScannedFlows) -> NDArray[np.bool_]:
     """The columns with flows near the largest hold-up that may lead beyond it, to the value asked for."""
     log_m, target = columns.flows[..., LOG_M], problem.target[columns.member, None]
     left = target - columns.flows[..., problem.which]
@@ -211,7 +211,7 @@ def _deeper(problem: Problem, columns: Columns) -> NDArray[np.bool_]:
     return (at_edge & within_reach).any(axis=1) & (problem.which != LOG_M)
 
 
-def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indices]:
+def _links(problem: Problem, columns: ScannedFlows) -> tuple[Brackets, Indices, Indices]:
     """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
     hide more, and wants a column, and those after which columns do not tell."""
     left = np.flatnonzero(columns.member[1:] == columns.member[:-1])
@@ -290,9 +290,9 @@ def _unlinked(
 
 
 def _turning(
-    columns: Columns, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
+    columns: ScannedFlows, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
 ) -> NDArray[np.bool_]:
-    """The gaps, after the columns ``left``, in which the quantity may turn along a family so near to its value that it
+    """The gaps, after the columns ``left``, in which the quantity may turn along a branch so near to its value that it
     passes it between columns without a change of sign, or more than once with one."""
     step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
     # Of all gaps in order, those between members missing.
@@ -313,7 +313,7 @@ def _turning(
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
     """The flows in the brackets, and the members on which one could not be found to ``tolerance``."""
     failed = np.zeros(len(problem.batch), dtype=bool)
-    near = Near(problem, brackets)
+    near = FlowsInBrackets(problem, brackets)
     log_t, slope = near.rough()
     pending = np.arange(brackets.member.size)
     flows: list[Flows] = []
@@ -344,7 +344,7 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
     return Flows.joined(flows), failed
 
 
-class Near:
+class FlowsInBrackets:
     """Flows near surface temperatures inside their brackets."""
 
     def __init__(self, problem: Problem, brackets: Brackets) -> None:
@@ -357,7 +357,7 @@ class Near:
         self._gradient = np.zeros((3, brackets.member.size))
 
     def gradient(self, which: Indices) -> Array:
-        """d (ln Q, ln h, ln M)/d ln T_surface along the family, (3, m)."""
+        """d (ln Q, ln h, ln M)/d ln T_surface along the branch, (3, m)."""
         return self._gradient[:, which]
 
     def at(self, which: Indices, log_t: Array, accuracy: Accuracy) -> Flows:
@@ -371,7 +371,7 @@ class Near:
         state = np.full((found.state.shape[0], which.size), np.nan)
         state[:, there] = found.state[:, safe[there]]
         with np.errstate(invalid="ignore"):
-            return flows_on(some, temperature, Found(np.arange(which.size), state, found.trouble))
+            return flows_on(some, temperature, EventZeros(np.arange(which.size), state, found.trouble))
 
     def rough(self) -> tuple[Array, Array]:
         """ln T of the flows by rough columns, and the slope of the quantity's logarithm over it in the bracket."""

@@ -12,7 +12,7 @@ from chuteflow.sweeps.batch import Batch
 Flags = NDArray[np.int8]
 
 
-class Status(IntEnum):
+class PointStatus(IntEnum):
     """How a point ended."""
 
     NOT_COMPUTED = -1

@@ -29,7 +29,7 @@ def sweep(
         study: a TOML file, its table as a dictionary, or a study.
         out: the store to make or go on with.
         workers: processes; one for each core by default.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for a study that is none, or a store that is of another one.

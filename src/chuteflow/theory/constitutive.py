@@ -242,9 +242,9 @@ class Reduced:
     - ``conduction`` = g3 nu/g1, with which y = conduction dtheta/dp;
     - ``drift`` = nu g4/g3, with theta = ln T - Gamma and dGamma/dln nu = drift; where dilute it is -b, and b is 0 but
       for laws whose g4 grows like 1/nu; ``coupling`` = (drift + b)/nu;
-    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
+    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation minus production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
-    - ``grip`` = A g1/g2, of the slip condition (3.16);
+    - ``wall_shear`` = A g1/g2, of the slip condition (3.16);
     - ``radial`` = g0, ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
     """
 
@@ -254,7 +254,7 @@ class Reduced:
     loss: Field
     work: Field
     shear: Field
-    grip: Field
+    wall_shear: Field
     radial: Field
     compressibility: Field
     stiffness: Field
@@ -280,7 +280,7 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
         loss=g.dissipation / big_g,
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
-        grip=big_g * nu_contact / g.viscosity,
+        wall_shear=big_g * nu_contact / g.viscosity,
         radial=g.radial,
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
@@ -355,13 +355,18 @@ _KNOWN_BY = 25
 _TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
 
 
-@lru_cache(maxsize=4096)
 def require_positive(law: Law, e: float, slope: float) -> None:
     """Check that a law gives numbers at every density, and that pressure, viscosity and conductivity are positive.
 
     Raises:
         InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
+    _require_positive(law, e, slope if law.knows_slope else 1.0)
+
+
+# Maps ask for thousands of chutes of the same grains.
+@lru_cache(maxsize=1024)
+def _require_positive(law: Law, e: float, slope: float) -> None:
     if not (isinstance(law.densest, (int, float)) and 0.0 < law.densest <= 1.0):
         raise InputError(
             f"closure {law}: its densest packing is {shown(law.densest)}: must be a number above 0, at most 1"

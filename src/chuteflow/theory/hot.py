@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.roots import bisected
-from chuteflow.theory.bases import BASES, Base
+from chuteflow.theory.bases import BASES, BaseCondition
 from chuteflow.theory.constitutive import Field, Law, reduce, require_limit
 
 #: lambda from which on there is no hot flow; 2.284 in section 4.3.
@@ -74,8 +74,8 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     )
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
-    grip = reduce(law, np.zeros(1), e, slope).grip
-    return Dilute(g20, g30, g40, g52, float(grip[0]) * g20, float(limit.radial[0]))
+    wall_shear = reduce(law, np.zeros(1), e, slope).wall_shear
+    return Dilute(g20, g30, g40, g52, float(wall_shear[0]) * g20, float(limit.radial[0]))
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class HotParameters:
 
     ``F10`` slip velocity over sqrt(T) at the base (4.2), with r^2 A0/(2 g20) for r^2 A0 g20/2 as printed: the
     limit of (3.16), as in (4.3); ``F21`` heat flux from the base over nu T^(3/2) (4.3); ``delta`` dissipation
-    less production in the interior over nu^2 T^(3/2) (4.9).
+    minus production in the interior over nu^2 T^(3/2) (4.9).
     """
 
     slope: float
@@ -105,7 +105,7 @@ class HotParameters:
 
     @property
     def mu(self) -> float:
-        """Share of shear in the velocity (4.16); infinite where F21 = 0."""
+        """Fraction of shear in the velocity (4.16); infinite where F21 = 0."""
         return self.alpha * self.slope / (self.F10 * self.dilute.g20)
 
     @property
@@ -140,7 +140,7 @@ _IMBALANCE = {
 
 
 def hot_parameters(
-    limit: Dilute, wall_restitution: float, roughness: float, slope: float, on: Base = BASES["richman"]
+    limit: Dilute, wall_restitution: float, roughness: float, slope: float, on: BaseCondition = BASES["richman"]
 ) -> HotParameters:
     """F10, F21 and delta, and what follows from them, for a chute of ``slope`` = tan(theta) with the base ``on``.
 
@@ -157,7 +157,7 @@ def hot_parameters(
     )
 
 
-def _slip(limit: Dilute, roughness: float, slope: float, on: Base) -> float:
+def _slip(limit: Dilute, roughness: float, slope: float, on: BaseCondition) -> float:
     first, second = on.where_empty(limit.g00, limit.A0 / limit.g20)
     F10 = float(on.slip(np.array(first), np.array(second), roughness, slope))
     if F10 <= 0.0:
@@ -165,7 +165,7 @@ def _slip(limit: Dilute, roughness: float, slope: float, on: Base) -> float:
     return F10
 
 
-def _loss(limit: Dilute, wall_restitution: float, roughness: float, on: Base) -> float:
+def _loss(limit: Dilute, wall_restitution: float, roughness: float, on: BaseCondition) -> float:
     loss, by_second = on.loss(wall_restitution, roughness)
     return loss + by_second * on.where_empty(limit.g00, limit.A0 / limit.g20)[1]
 
@@ -174,7 +174,7 @@ def _loss(limit: Dilute, wall_restitution: float, roughness: float, on: Base) ->
 
 
 @dataclass(frozen=True)
-class Budget:
+class HotEnergyBudget:
     """Energy lost and made, ``l`` and ``m`` tan^2 at the base (4.26), ``L`` and ``M`` tan^2 inside (4.25).
 
     L and M are for one value of lambda, which hot flows have where (m tan^2 - l)^2 = L - M tan^2 (4.27).
@@ -187,12 +187,12 @@ class Budget:
 
 
 def budget(
-    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: Base = BASES["richman"]
-) -> Budget:
+    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: BaseCondition = BASES["richman"]
+) -> HotEnergyBudget:
     """The energy budget (4.25), (4.26) for one value of lambda, of either sign."""
     root = math.sqrt(math.pi / 2.0)
     inside = math.pi * lambda_ * limit.g30 / 3.0
-    return Budget(
+    return HotEnergyBudget(
         l=root * _loss(limit, wall_restitution, roughness, on),
         m=root * _slip(limit, roughness, 1.0, on),
         L=inside * limit.g52,
@@ -201,7 +201,7 @@ def budget(
 
 
 def slope_at(
-    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: Base = BASES["richman"]
+    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: BaseCondition = BASES["richman"]
 ) -> float | None:
     """tan(theta) at which hot flows, or their bound, have this lambda: (4.27) with lambda for lambda_c.
 
@@ -232,7 +232,7 @@ def slope_bounds(
     wall_restitution: float,
     roughness: float,
     lambda_c: float = LAMBDA_C,
-    on: Base = BASES["richman"],
+    on: BaseCondition = BASES["richman"],
 ) -> SlopeBounds | None:
     """The slopes with hot flows, exactly (4.25)-(4.27), or None where there are none.
 

@@ -16,7 +16,7 @@ from chuteflow.paper.claims.registry import Finding, claim, close, decide, round
 from chuteflow.paper.claims.shared import PRODUCTIVE, SLOPE, all_flows, curve_of, folds, hot_flow
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
-from chuteflow.theory.hot import Budget, budget, hot_solution, inversion_lambda, slope_at, slope_bounds
+from chuteflow.theory.hot import HotEnergyBudget, budget, hot_solution, inversion_lambda, slope_at, slope_bounds
 
 #: The bound that section 4.3 gives for lambda.
 PRINTED = 2.284
@@ -392,7 +392,7 @@ def interior_bound() -> Finding:
     )
 
 
-def _budget(lambda_: float) -> Budget:
+def _budget(lambda_: float) -> HotEnergyBudget:
     return budget(hot(dissipative(SLOPE)).parameters.dilute, 0.8, 0.6, lambda_)
 
 

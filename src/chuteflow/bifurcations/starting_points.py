@@ -1,11 +1,11 @@
-"""Where boundaries are entered: their points on the families of flows at one value of the second parameter.
+"""Where boundaries are entered: their points on the branches of flows at one value of the second parameter.
 
-# notation: sigma runs from 0 to 1 along the chord between two successive flows of a family in the plane
+# notation: sigma runs from 0 to 1 along the chord between two successive flows of a branch in the plane
 # (ln M, ln T_surface).
 
-A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
+A boundary that begins and ends between two values, as the two folds that begin at a cusp, has no point at
 either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
-from the ends of families, the parameter is moved until the condition holds.
+from the ends of branches, the parameter is moved until the condition holds.
 """
 
 from __future__ import annotations
@@ -16,21 +16,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, TestFunction
 from chuteflow.bifurcations.grids import carried_to, pinned
 from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.branches.families import TracedFamily, traced_families
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import TracedBranch, trace_branches
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.numerics.roots import bisected
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import LOSS, WORK, model
-from chuteflow.steady.solver import Condition as SolverCondition
-from chuteflow.steady.solver import Solution, resolve
+from chuteflow.steady.solver import Condition, Solution, resolve
 
 #: The kinds of boundaries, and the quantities whose folds they are.
 FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
@@ -41,11 +40,11 @@ HELD = np.array([0.0, 0.0, 1.0])
 _BEYOND, _BESIDE = 0.02, 1.0
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
-#: A boundary beside the families is looked for as far as so many times the distance to go to it.
+#: A boundary beside the branches is looked for as far as so many times the distance to go to it.
 _FARTHER = 1.5
 #: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
 #: tolerance, and ends where so small a share is left.
-_STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+_STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: Nodes of the grid of a flow at most.
 MOST_NODES = 640
 #: A condition that no flow enters is met at values of the parameter known to this.
@@ -57,8 +56,8 @@ _LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
-    """A flow of a family, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
+class _SampledFlow:
+    """A flow of a branch, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
     plane (ln M, ln T_surface), (2, n+3), and the Jacobian of the steady problem."""
 
     solution: Solution
@@ -75,27 +74,27 @@ class _Sample:
         return float(self.gradient @ solve_each(matrix, side))
 
 
-def conditions(kind: str) -> Sequence[Condition]:
+def conditions(kind: str) -> Sequence[TestFunction]:
     """The conditions of a kind of boundary."""
     if kind in FOLDS:
         return [Fold(FOLDS[kind])]
     return [Inversion()] if kind == "density-inversion" else [InteriorChange(False), InteriorChange(True)]
 
 
-def on_families(
-    sweep: Sweep,
-    condition: Condition,
+def on_branches(
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
-    families: Sequence[TracedFamily],
+    branches: Sequence[TracedBranch],
     reach: float,
     tolerance: float,
 ) -> Iterator[BoundaryPoint]:
-    """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
-    far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _among(family)]
+    """Every point of the boundary on branches of flows at one value of the parameter, and points beside them, as
+    far as ``reach`` in the parameter, where a branch comes near to the condition and does not meet it."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(branch)]
         if isinstance(condition, Fold):
-            for turn in family.turns(condition.which, tolerance):
+            for turn in branch.turns(condition.which, tolerance):
                 if followed(turn.point.solution):
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
@@ -106,9 +105,9 @@ def on_families(
                 yield point
 
 
-def _among(family: TracedFamily) -> list[Solution]:
-    """The flows of a family that a grid of a few pieces resolves: boundaries are followed on such."""
-    return [solution for solution in family.solutions if followed(solution)]
+def _among(branch: TracedBranch) -> list[Solution]:
+    """The flows of a branch that a grid of a few pieces resolves: boundaries are followed on such."""
+    return [solution for solution in branch.solutions if followed(solution)]
 
 
 def followed(solution: Solution) -> bool:
@@ -116,18 +115,22 @@ def followed(solution: Solution) -> bool:
     return len(solution.problem.grid.nodes) <= MOST_NODES
 
 
-def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
-    """Every family of flows in a range at one value of the parameter."""
-    return traced_families(model(sweep.chute_at(value)), within)
+def branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
+    """Every branch of flows in a range at one value of the parameter."""
+    return trace_branches(model(sweep.chute_at(value)), within)
 
 
-def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
+def _from_flow(
+    sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution, tolerance: float
+) -> BoundaryPoint:
     """The point of the boundary at a value of the parameter, from its flow."""
     system, w = on_grid_of(sweep, condition, value, solution)
     return solved(system, w, HELD, value, tolerance)
 
 
-def on_grid_of(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> tuple[BoundarySystem, Array]:
+def on_grid_of(
+    sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution
+) -> tuple[BoundarySystem, Array]:
     """The system on the grid of a flow, and the flow on it."""
     problem, z = pinned(solution.problem, solution.z)
     w = np.append(z, value)
@@ -135,9 +138,9 @@ def on_grid_of(sweep: Sweep, condition: Condition, value: float, solution: Solut
 
 
 def _zeros(
-    sweep: Sweep, condition: Condition, value: float, samples: Sequence[_Sample], tolerance: float
+    sweep: SecondParameter, condition: TestFunction, value: float, samples: Sequence[_SampledFlow], tolerance: float
 ) -> list[BoundaryPoint]:
-    """The points along a family where the condition's function vanishes."""
+    """The points along a branch where the condition's function vanishes."""
     found: list[BoundaryPoint] = []
     for first, last in pairwise(samples):
         for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
@@ -147,7 +150,13 @@ def _zeros(
 
 
 def _between(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, tolerance: float, halvings: int
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    tolerance: float,
+    halvings: int,
 ) -> Iterator[BoundaryPoint]:
     """The points between two flows: as the cubic through both says, or those in both halves."""
     chord = (last.solution.macroscopic - first.solution.macroscopic)[LOG_M:]
@@ -180,7 +189,13 @@ def _places(f0: float, f1: float, d0: float, d1: float) -> list[float]:
 
 
 def _near(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, sigma: float, tolerance: float
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    sigma: float,
+    tolerance: float,
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -len(s.problem.grid.nodes))
@@ -203,8 +218,8 @@ def _near(
     return point if inside and beside <= _BESIDE * length else None
 
 
-def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple[int, Array]]:
-    """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
+def _nearest(samples: Sequence[_SampledFlow], condition: TestFunction) -> Iterator[tuple[int, Array]]:
+    """Indices of the flows that come nearest to the condition, or end the branch on the way to it, with a chord."""
     plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
     chords = np.diff(plane, axis=0)
     if len(samples) < 3 or not chords.any(axis=1).all():
@@ -222,19 +237,19 @@ def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple
 
 
 def _beside(
-    sweep: Sweep,
-    condition: Condition,
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
     solution: Solution,
     chord: Array,
     reach: float,
     tolerance: float,
 ) -> BoundaryPoint | None:
-    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
+    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its branch."""
     row = np.array([chord[1], chord[0], 0.0])
-    plane = SolverCondition.plane(chord, solution.macroscopic)
+    plane = Condition.plane(chord, solution.macroscopic)
     at = value
-    for _ in range(_WALK):
+    for _ in range(_MOST_STEPS):
         system, w = on_grid_of(sweep, condition, at, solution)
         ahead = at + shift(system, w, row)
         if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
@@ -261,17 +276,17 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
     return bool(np.abs(gap).max() < 1e-7)
 
 
-def _sample(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> _Sample:
+def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution) -> _SampledFlow:
     problem, z = pinned(solution.problem, solution.z)
     stretch = float(np.reshape(problem.stretch, ()))
     system = BoundarySystem(sweep, condition, problem.degree, stretch, problem.breaks, problem.pins)
     at = system.local(np.append(z, value))
-    f, gradient = condition.along_family(at)
-    return _Sample(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
+    f, gradient = condition.along_branch(at)
+    return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
 
-def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: float) -> list[float]:
-    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole families.
+def whatever_the_flow(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
+    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole branches.
 
     On the half-line dissipation and production balance at the surface, or at the density where they come nearest
     to it, in all flows of a chute that have that density or in none.
@@ -287,12 +302,12 @@ def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: floa
     return out
 
 
-def along_families(
-    sweep: Sweep, condition: Condition, value: float, families: Sequence[TracedFamily], tolerance: float
+def along_branches(
+    sweep: SecondParameter, condition: TestFunction, value: float, branches: Sequence[TracedBranch], tolerance: float
 ) -> Iterator[BoundaryPoint]:
-    """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _among(family)]
+    """One point of each stretch of the branches of flows at a value of the parameter that is boundary throughout."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(branch)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
@@ -301,14 +316,14 @@ def along_families(
             yield through(system, w, tolerance)
 
 
-def _at_surface(sweep: Sweep, value: float) -> float:
+def _at_surface(sweep: SecondParameter, value: float) -> float:
     """Net loss at the surface of the half-line."""
     here, _ = sweep.models(value)
     f, _ = here.closures(np.zeros(1))
     return float(f[LOSS, 0] - here.slope**2 * f[WORK, 0])
 
 
-def _least(sweep: Sweep, value: float) -> float:
+def _least(sweep: SecondParameter, value: float) -> float:
     """The least net loss at any density."""
     here, _ = sweep.models(value)
     (low, high), least = _LOG_X, np.inf
