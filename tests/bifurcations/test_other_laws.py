@@ -1,5 +1,7 @@
 """Boundaries past the breaks of a law, and under a law without a temperature far above, against curves of flows."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from chuteflow.bifurcations.grids import pinned
 from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.steady.solver import SolverStatus
 
-GRAINS = {"restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
+GRAINS: dict[str, Any] = {"restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
 
 
 def fluxes_at(found, slope):

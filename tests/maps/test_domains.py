@@ -116,7 +116,9 @@ def test_a_thousand_points_for_each_surface_are_classified_as_by_the_full_enumer
 )
 def test_points_under_other_laws_on_other_bases_are_those_of_the_full_enumeration(closure, base):
     chute = Chute(0.3, 0.8, 0.8, 0.6, closure=closure, base=base)
-    plane = Plane(Axis("slope", 0.28, 0.4), Axis("roughness", 0.56, 0.7), chute, TEMPERATURES)
+    plane = ParameterPlane(
+        ParameterAxis("slope", 0.28, 0.4), ParameterAxis("roughness", 0.56, 0.7), chute, TEMPERATURES
+    )
     assert plane.hot_known is (closure != "garzo-dufty")
     for place in ((0.15, 0.3), (0.8, 0.6)):
         assert code(plane, *place) == enumerated(plane.chute_at(*place))

@@ -11,7 +11,7 @@ import numpy as np
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
 from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
 from chuteflow.bifurcations.points import BoundaryPoint, solved
-from chuteflow.bifurcations.seeds import FOLDS, HELD, on_grid_of
+from chuteflow.bifurcations.starting_points import FOLDS, HELD, on_grid_of
 from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import TracedBoundary, traced
 from chuteflow.branches.enumeration import flows

@@ -164,8 +164,8 @@ def _followed(
     *,
     closes: bool,
 ) -> bool:
-    """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to the
-    start again."""
+    """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to
+    the start again."""
     system = start.system
     side.stop("")
     path = trace(system, start.w, direction=system.weights * tangent, control=control)

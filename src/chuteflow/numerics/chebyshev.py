@@ -229,7 +229,7 @@ def singular_weights(degree: int, beta: complex) -> Array:
     out[1:] += product[0] * _at_zero(g) * g.nodes[1:] ** beta
     out[0] = 0.0
     out.setflags(write=False)
-    return out
+    return cast(Array, out)
 
 
 def _at_zero(g: Grid) -> Array:

@@ -35,7 +35,7 @@ from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import bases
 from chuteflow.theory.constitutive import Coefficients, Law
-from chuteflow.theory.transport import Contact, Material
+from chuteflow.theory.transport import AtBase, Material
 
 #: Degree of the grid in m.
 DEGREE = 40
@@ -257,7 +257,7 @@ class Layer:
         def exchange(u_z: float) -> tuple[Array, Array]:
             """M_x and the loss."""
             grad_u = ((0.0, 0.0, u_z), (0.0, 0.0, 0.0), (0.0, 0.0, w_z))
-            at = Contact(nu, g.radial, (u, 0.0, 0.0), root_T, grad_u, normal)
+            at = AtBase(nu, g.radial, (u, 0.0, 0.0), root_T, grad_u, normal)
             (along, _, _), loss = on.exchange(at, chute.roughness, chute.wall_restitution)
             return along, loss
 

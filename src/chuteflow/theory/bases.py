@@ -21,7 +21,7 @@ from chuteflow.numerics.complex_step import stepped
 from chuteflow.parameters import PARAMETERS
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Reduced
-from chuteflow.theory.transport import Contact, Number, Vector, richman_exchange
+from chuteflow.theory.transport import AtBase, Number, Vector, richman_exchange
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class BaseCondition:
         function."""
 
     @abstractmethod
-    def exchange(self, at: Contact, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
         """The momentum M that the base takes from moving grains, and the energy lost in collisions with it."""
 
     def checked_roughness(self, value: Any) -> float:
@@ -119,7 +119,7 @@ class Richman(BaseCondition):
         """(2.15), the same at every density."""
         return boundary.base_loss(wall_restitution, roughness), 0.0
 
-    def exchange(self, at: Contact, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
         """(2.9)-(2.15)."""
         return richman_exchange(at, roughness, wall_restitution, self.diameter)
 
@@ -184,7 +184,7 @@ class JohnsonJackson(BaseCondition):
         del roughness
         return 0.0, math.pi * math.sqrt(3.0) / (4.0 * self.packing) * (1.0 - wall_restitution**2)
 
-    def exchange(self, at: Contact, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
         """The drag is proportional to the velocity along the wall."""
         strength = at.density * at.radial * at.root_temperature
         drag = -(strength * (math.pi * math.sqrt(3.0) / (6.0 * self.packing) * self.specularity))

@@ -184,7 +184,8 @@ class Law:
         """
         own: Any = getattr(self.coefficients, "breaks", self.breaks)
         try:
-            places = sorted(float(nu) for nu in (own(e, slope) if callable(own) else own))
+            given: Any = own(e, slope) if callable(own) else own
+            places = sorted(float(nu) for nu in given)
         except Exception as error:  # noqa: BLE001 - a law of the user may raise anything
             said = f"{type(error).__name__}: {error}"
             raise InputError(f"closure {self}: its breaks fail at e = {e}, slope = {slope}: {said}") from None

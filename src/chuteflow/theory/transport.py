@@ -79,13 +79,13 @@ class Motion:
     inertia: tuple[Number, ...]
 
     @property
-    def contact(self) -> Contact:
+    def contact(self) -> AtBase:
         """What a base meets of it."""
-        return Contact(self.density, self.radial, self.velocity, self.root_temperature, self.shear, self.pressure[2][2])
+        return AtBase(self.density, self.radial, self.velocity, self.root_temperature, self.shear, self.pressure[2][2])
 
 
 @dataclass(frozen=True)
-class Contact:
+class AtBase:
     """What a base meets: density and g0 of the grains, their velocity and sqrt(T), the gradient ``shear`` of the
     velocity, and the ``normal`` stress P_zz."""
 
@@ -100,7 +100,7 @@ class Contact:
 class Floor(Protocol):
     """A base, as moving grains meet it."""
 
-    def exchange(self, at: Contact, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
         """The momentum M that it takes from the grains, and the energy D that is lost in collisions with it."""
         ...
 
@@ -208,7 +208,7 @@ def base_conditions(
     )
 
 
-def richman_exchange(at: Contact, roughness: float, wall_restitution: float, diameter: float) -> tuple[Vector, Number]:
+def richman_exchange(at: AtBase, roughness: float, wall_restitution: float, diameter: float) -> tuple[Vector, Number]:
     """M (2.9) and D (2.15) of hemispheres of a ``diameter``; M_z = P_zz fixes nu chi T, with the exclusion factor chi
     of (2.10)."""
     root_T, mean = at.root_temperature, 0.5 * (1.0 + diameter)
