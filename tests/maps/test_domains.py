@@ -109,6 +109,30 @@ def test_a_thousand_points_for_each_surface_are_classified_as_by_the_full_enumer
     assert len(unknown) <= 3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("closure", "base"),
+    [("garzo-dufty", "richman"), ("extended", "richman:diameter=1.2"), ("lun", "johnson-jackson:specularity=0.2")],
+)
+def test_points_under_other_laws_on_other_bases_are_those_of_the_full_enumeration(closure, base):
+    chute = Chute(0.3, 0.8, 0.8, 0.6, closure=closure, base=base)
+    plane = ParameterPlane(
+        ParameterAxis("slope", 0.28, 0.4), ParameterAxis("roughness", 0.56, 0.7), chute, TEMPERATURES
+    )
+    assert plane.hot_known is (closure != "garzo-dufty")
+    for place in ((0.15, 0.3), (0.8, 0.6)):
+        assert classify(plane, *place) == enumerated(plane.chute_at(*place))
+
+
+def test_a_map_under_a_law_without_a_temperature_far_above_leaves_hot_flows_open():
+    chute = Chute(0.3, 0.8, 0.8, 0.6, closure="garzo-dufty")
+    found = domain(chute, ("wall_restitution", 0.7, 0.8), ("roughness", 0.6, 0.65), size=(4, 4), tolerance=0.1)
+    assert (found.hot == -1).all()
+    assert found.exists.any()
+    with pytest.raises(InputError, match=r"closure garzo-dufty at e = 0\.5: T grows so fast far above"):
+        domain(chute, ("restitution", 0.5, 0.8), ("roughness", 0.6, 0.65))
+
+
 def test_cells_are_those_of_their_centres(base_map):
     plane, random = base_map.plane, np.random.default_rng(1)
     wrong = 0

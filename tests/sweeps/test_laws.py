@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 
 from chuteflow import Chute, InputError, flows
+from chuteflow.cli.program import DONE, main
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.outcome import Reason
 from chuteflow.sweeps.store import Store
@@ -137,3 +139,19 @@ def test_a_law_that_is_not_there_is_named(path, closure):
     path.write_text(STUDY[: STUDY.index("closure")] + f'closure = "{closure}"\n')
     with pytest.raises(InputError, match=r"parameters\.closure: "):
         read(path)
+
+
+@pytest.mark.slow
+def test_two_workers_give_the_bits_of_the_built_in_law(path, tmp_path):
+    head = STUDY[: STUDY.index("closure")].replace("[0.29, 0.3]", "[0.28, 0.29, 0.3, 0.31]")
+    found = {}
+    for closure in ("grains.py:OWN", "extended"):
+        path.write_text(head + f'closure = "{closure}"\n')
+        out = tmp_path / f"{closure.partition('.')[0]}.zarr"
+        assert main(["sweep", str(path), "--out", str(out), "--workers", "2", "--no-check", "--quiet"]) == DONE
+        found[closure] = zarr.open_group(out, mode="r")
+    own, built_in = found.values()
+    names = [name for name, array in built_in.arrays() if array.dtype.kind in "fi"]
+    assert len(names) > 5
+    for name in names:
+        np.testing.assert_array_equal(own[name][:], built_in[name][:])

@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, flows, hot, stability_of
+from chuteflow import Chute, InputError, flows, hot
+from chuteflow.steady.collocation import LOG_Q
+from chuteflow.steady.mapped.solution import refine
 from chuteflow.steady.model import SHEAR, WALL_SHEAR, model
+from chuteflow.steady.solver import Condition
 from chuteflow.theory.bases import BASES, base
 from chuteflow.theory.laws import LAWS
 
@@ -104,10 +107,26 @@ def test_what_is_wrong_with_a_base_is_named(change, message):
 
 def test_what_knows_the_base_of_the_paper_alone_says_so():
     chute = Chute(SLOPE, E, 0.8, R, base="richman:diameter=1.1")
-    with pytest.raises(InputError, match="known for the base richman alone"):
-        hot(chute)
-    with pytest.raises(InputError, match="known for the base richman alone"):
-        stability_of(flows(chute, Q=3.0)[0], kx=0.1, ky=0.0)
+    with pytest.raises(InputError, match="the mapped method is known for the base richman alone"):
+        refine(chute, flows(chute, Q=3.0)[0], Condition.fix(LOG_Q, 3.0))
+
+
+@pytest.mark.parametrize("name", ["richman:diameter=1.3", "johnson-jackson:specularity=0.1"])
+def test_hot_flows_on_other_bases_come_to_their_limit(name):
+    chute = Chute(0.36, E, 0.85, 0.7, base=name)
+    limit = hot(chute)
+    assert limit.mass_holdup is not None
+    for temperature in (1e3, 1e5):
+        (flow,) = flows(chute, T_surface=temperature)
+        assert flow.mass_holdup == pytest.approx(limit.mass_holdup, rel=10.0 / temperature)
+        assert math.log(flow.mass_flux / math.sqrt(temperature)) == pytest.approx(
+            limit.log_flux, abs=10.0 / temperature
+        )
+    assert limit.slope_bounds is not None
+    for slope, there in ((limit.slope_bounds.lowest - 1e-3, 0), (limit.slope_bounds.lowest + 1e-3, 1)):
+        other = Chute(slope, E, 0.85, 0.7, base=name)
+        assert hot(other).exists is bool(there)
+        assert len(flows(other, T_surface=1e4)) == there
 
 
 def test_every_base_is_known_by_its_text():

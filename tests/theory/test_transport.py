@@ -11,6 +11,7 @@ from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import grains, steady_motion
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
+from chuteflow.theory.bases import BASES
 from chuteflow.theory.transport import (
     Fields,
     base_conditions,
@@ -99,7 +100,7 @@ def plain_motion(nu, T, u, rate, heating, thinning, slope=0.3):
 
     chute = Chute(slope, 0.8, 0.75, ROUGHNESS)
     moving = motion(fields, gradient, grains_of(chute))
-    return moving, base_conditions(moving, ROUGHNESS, 0.75)
+    return moving, base_conditions(moving, BASES["richman"], ROUGHNESS, 0.75)
 
 
 def grains_of(chute):
@@ -139,7 +140,9 @@ def test_steady_flows_exert_no_force(three):
         for force, scale in zip(moving.forces, (1.0, at.profile.volume_fraction.max(), 1.0, 1.0, 1.0), strict=True):
             assert np.abs(force).max() < limit * scale
         chute = flow.chute
-        ends = [value[-1] for value in base_conditions(moving, chute.roughness, chute.wall_restitution)]
+        ends = [
+            value[-1] for value in base_conditions(moving, BASES["richman"], chute.roughness, chute.wall_restitution)
+        ]
         np.testing.assert_allclose(ends, 0.0, atol=limit)
 
 

@@ -1,15 +1,17 @@
 """Flows under every law against integration from the surface down with the breaks of the law located."""
 
 import math
+import os
 
 import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, flows, hot, stability_of
 from chuteflow.theory.constitutive import reduce
-from chuteflow.theory.laws import law
+from chuteflow.theory.laws import LAWS, law
+from chuteflow.theory.radial import RADIALS
 
-from . import downwards
+from . import downwards, shooting
 
 #: Slope, e, e_w and r of the paper's chute.
 PAPER = (0.3, 0.8, 0.8, 0.6)
@@ -102,19 +104,73 @@ def test_where_the_centre_of_mass_is_infinite_or_nothing_is_known_far_above_says
             run(chute)
 
 
+#: Flows that a change of the surface temperature magnified by more leaves without nine digits of an integration down.
+MAGNIFIED = 3e3
+
+
+def random_problem(rng):
+    """A chute of any law, base and surface, and a hold-up."""
+    name, base = list(LAWS)[rng.integers(len(LAWS))], BASES[rng.integers(len(BASES))]
+    settings = []
+    if rng.uniform() < 0.5:
+        settings.append(f"radial={list(RADIALS)[rng.integers(len(RADIALS))]}")
+    if rng.uniform() < 0.25:
+        settings.append("friction=0.05")
+    closure = f"{name}:{','.join(settings)}" if settings else name
+    parameters = {
+        "slope": rng.uniform(0.15, 0.5),
+        "restitution": rng.uniform(0.7, 0.98),
+        "wall_restitution": rng.uniform(0.5, 1.0),
+        "roughness": rng.uniform(0.53, 0.86),
+        "surface": "interface" if rng.uniform() < 0.25 else "free",
+    }
+    return Chute(**parameters, closure=closure, base=base), float(np.exp(rng.uniform(math.log(0.2), math.log(6.0))))
+
+
+@np.errstate(all="ignore")
+def compared(chute, mass):
+    """The flows of a chute with a hold-up against all that shooting finds: how many, how many of them are told to nine
+    digits, and the largest difference of these."""
+    on = {key: float(value) for key, value in (part.split("=") for part in chute.base.split(":")[1:])}
+    problem = shooting.Problem(chute.law, chute.slope, chute.e, chute.ew, chute.roughness, mass, chute.surface, **on)
+    known = list(flows(chute, M=mass))
+    temperatures = np.array([flow.surface_temperature for flow in known])
+    worst, told = 0.0, 0
+    for low, high in problem.brackets():
+        near = np.abs(np.log(temperatures / math.sqrt(low * high))) if len(known) else np.array([np.inf])
+        assert near.min() < 1e-3, f"missed: {chute}, M = {mass}, T_surface from {low} to {high}"
+    for flow in known:
+        if not shooting.COLDEST < flow.surface_temperature < shooting.HOTTEST:
+            continue
+        temperature, (log_q, log_h, log_t), magnified = problem.solved(flow.surface_temperature)
+        # Trajectories of cold flows part on the way down.
+        if magnified > MAGNIFIED:
+            continue
+        off = max(
+            abs(math.log(temperature / flow.surface_temperature)),
+            abs(log_q - math.log(flow.mass_flux)),
+            abs(log_h - math.log(flow.centre_of_mass)),
+            abs(log_t - math.log(flow.base_temperature)),
+        )
+        assert off < 1e-9, f"off by {off}: {chute}, M = {mass}, T_surface = {flow.surface_temperature}"
+        worst, told = max(worst, off), told + 1
+    return len(known), told, worst
+
+
 @pytest.mark.slow
-def test_random_chutes_under_random_laws_on_random_bases():
-    rng = np.random.default_rng(15)
-    checked = 0
-    for _ in range(200):
-        name = LAWS_TRIED[rng.integers(len(LAWS_TRIED))]
-        e, e_w, r = rng.uniform(0.7, 0.98), rng.uniform(0.5, 1.0), rng.uniform(0.53, 0.86)
-        slope = rng.uniform(0.15, 0.5)
-        base = BASES[rng.integers(len(BASES))]
-        on = {key: float(value) for key, value in (part.split("=") for part in base.split(":")[1:])}
-        chute = Chute(slope, e, e_w, r, closure=name, base=base)
-        for flow in flows(chute, M=float(rng.uniform(0.3, 3.0))):
-            if flow.surface_temperature > 1e-2:
-                assert_carried(flow, law(name), e_w, r, 1e-8, **on)
-                checked += 1
-    assert checked > 30
+@pytest.mark.parametrize("part", range(4))
+def test_random_chutes_under_all_laws_on_all_bases_have_the_flows_that_shooting_finds(part):
+    """Chutes until CHUTEFLOW_SHOOTING in all (24 unless another number is given) have flows: none missed, nine digits.
+
+    Those without flows are looked at too.
+    """
+    wanted = int(os.environ.get("CHUTEFLOW_SHOOTING", "24")) // 4
+    rng = np.random.default_rng([15, part])
+    every = []
+    while sum(one[0] > 0 for one in every) < wanted:
+        every.append(compared(*random_problem(rng)))
+    found, told = (sum(one[i] for one in every) for i in (0, 1))
+    print(
+        f"{len(every)} chutes, {found} flows, {told} to nine digits, largest difference {max(e[2] for e in every):.1e}"
+    )
+    assert told > 0.8 * found

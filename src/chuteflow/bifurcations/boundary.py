@@ -13,6 +13,7 @@ import numpy as np
 from chuteflow import display
 from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
+from chuteflow.bifurcations.starting_points import followed
 from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
@@ -26,10 +27,9 @@ from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.kinks import crossings
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
-from chuteflow.theory.constitutive import require_limit
+from chuteflow.theory.constitutive import require_height
 from chuteflow.threads import on_one_thread
 
 #: What can be followed.
@@ -145,11 +145,11 @@ class BoundarySet(Result, Sequence[Boundary]):
     def incomplete(self) -> str | None:
         """Which flows boundaries were not followed among, in words; None where there are none."""
         solutions = (solution for branches in self.families for branch in branches for solution in branch.solutions)
-        if not any(crossings(solution.elements).size for solution in solutions):
+        if all(followed(solution) for solution in solutions):
             return None
         return (
-            f"the density of some flows passes a break of the closure {self.chute.closure}: boundaries among these "
-            "are not followed, and may be missing"
+            "some deep flows wind more than a grid of few pieces resolves: boundaries among these are not followed, "
+            "and may be missing"
         )
 
     def __repr__(self) -> str:
@@ -279,7 +279,7 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
     for value in (low, high):
         end = sweep.chute_at(value)  # which says what is allowed
         if end.surface == "free":
-            require_limit(end.law, end.restitution, end.slope, "boundaries need")
+            require_height(end.law, end.restitution, end.slope)
     if not low < high:
         raise InputError(f"{second} from {low:g} to {high:g}: the range must rise")
     return sweep

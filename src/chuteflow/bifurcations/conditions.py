@@ -24,7 +24,15 @@ from typing import Protocol, Self, cast
 
 import numpy as np
 
-from chuteflow.numerics.chebyshev import AnyGrid, Array, grid, interpolation_matrix, refinement
+from chuteflow.numerics.chebyshev import (
+    AnyGrid,
+    Array,
+    PiecewiseGrid,
+    grid,
+    interpolation_matrix,
+    piecewise_grid,
+    refinement,
+)
 from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
@@ -51,10 +59,14 @@ class Linearisation:
     by_parameter: Array
 
     @classmethod
-    def at(cls, problem: Collocation, stepped: Collocation, z: Array) -> Linearisation:
-        """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further."""
+    def at(cls, problem: Collocation, stepped: Collocation, z: Array, kinks: Array | None = None) -> Linearisation:
+        """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further;
+        ``kinks`` (k,) are the derivatives of the pinned kinks with respect to it."""
         state, beyond = problem.state(z), stepped.state(z)
-        return cls(z, state, beyond, state.residual(), state.jacobian(), derivative(beyond.residual()))
+        by_parameter = derivative(beyond.residual())
+        if kinks is not None:
+            by_parameter[-len(kinks) :] -= kinks
+        return cls(z, state, beyond, state.residual(), state.jacobian(), by_parameter)
 
 
 class TestFunction(Protocol):
@@ -173,12 +185,9 @@ class Inversion(_OfFields):
         """See :class:`TestFunction`."""
         state = at.state
         row = _largest(state.problem.grid, state.rise)
-        nodes = np.arange(len(row))
-        by_z = np.zeros((len(row), len(row) + 2))
-        by_z[nodes, nodes] = state.p / state.mass
-        by_z[:, -1] = (state.overburden_fraction - 1.0) * state.rise
         # Where a largest value lies inside, moving the place changes nothing to first order.
-        return float(row @ state.rise) - 1.0, row @ by_z, 0.0
+        by_parameter = float(row @ derivative(at.stepped.rise))
+        return float(row @ state.rise) - 1.0, row @ state.rise_gradient, by_parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,10 +206,8 @@ class InteriorChange(_OfFields):
         state = at.state
         row = _largest(state.problem.grid, state.net_loss if self.largest else -state.net_loss)
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
-        by_z = np.concatenate(
-            [-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.overburden_fraction]]
-        )
-        return float(row @ state.net_loss), by_z, float(row @ derivative(at.stepped.net_loss))
+        by_parameter = float(row @ derivative(at.stepped.net_loss))
+        return float(row @ state.net_loss), by_log_x @ state.log_x_gradient, by_parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,14 +237,19 @@ def _bordered(jacobian: Array, gradient: Array) -> Array:
 
 def _largest(g: AnyGrid, values: Array) -> Array:
     """The row (n+1,) that interpolates nodal values at the place in [0, 1] where ``values`` are largest."""
-    fine = max(_SAMPLES, 2 * g.degree)
-    sampled = refinement(g.degree, fine) @ values
+    if isinstance(g, PiecewiseGrid):
+        places = piecewise_grid(tuple(g.breaks.tolist()), 2 * g.piece.degree).nodes
+        sampled = interpolation_matrix(g, places) @ values
+    else:
+        places = grid(max(_SAMPLES, 2 * g.degree)).nodes
+        sampled = refinement(g.degree, len(places) - 1) @ values
     k = int(np.argmax(sampled))
-    s = float(grid(fine).nodes[k])
-    if 0 < k < fine:
+    s = float(places[k])
+    # At an end of a piece it may be largest without a slope of 0.
+    if 0 < k < len(places) - 1 and not (isinstance(g, PiecewiseGrid) and s in g.breaks):
         slope = g.derivative @ values
         bend = g.derivative @ slope
         for _ in range(_STEPS):
             (row,) = interpolation_matrix(g, np.array([s]))
-            s = float(np.clip(s - (row @ slope) / (row @ bend), *grid(fine).nodes[[k - 1, k + 1]]))
+            s = float(np.clip(s - (row @ slope) / (row @ bend), *places[[k - 1, k + 1]]))
     return interpolation_matrix(g, np.array([s]))[0]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chuteflow.bifurcations.grids import refined, unpinned
 from chuteflow.bifurcations.system import BoundarySystem
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -17,10 +18,12 @@ from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.solver import Solution, SolverStatus, prolong
+from chuteflow.steady.solver import Solution, SolverStatus
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
 _STEP = 1e-7
+#: How often a point is solved again on pieces that meet where the flow passes kinks of the law.
+_REFITS = 4
 #: Least error ever claimed, and error of the equations by rounding and tabulation of the closures.
 _FLOOR, _NOISE = 1e-12, 1e-13
 
@@ -51,8 +54,15 @@ def solve_boundary_point(system: BoundarySystem, w: Array, row: Array, value: fl
         SolveError: where it does not converge, or the finest grid does not suffice.
     """
     finer_degrees = [degree for degree in DEGREES if degree > system.degree]
+    refits = _REFITS
     while finer_degrees:
         result = newton(lambda w, system=system: _bordered(system, w, row, value), w, tolerance=_STEP, longest_step=2.0)
+        # Where the start is on a grid for other breaks than the flow there passes, Newton's method does not converge.
+        refitted = system.refitted(result.z if result.converged else w) if refits else None
+        if refitted is not None:
+            (system, w), refits = refitted, refits - 1
+            finer_degrees = [degree for degree in DEGREES if degree > system.degree]
+            continue
         if not result.converged:
             raise SolveError("a point of a boundary could not be solved: narrow the range searched")
         coarse = _quantities(system, result.z)
@@ -83,7 +93,7 @@ def solve_across(system: BoundarySystem, w: Array, tolerance: float) -> Boundary
 
 def refine_grid(system: BoundarySystem, w: Array, degree: int) -> tuple[BoundarySystem, Array]:
     """The system and a point of it on the grid of another degree."""
-    problem, z = prolong(system.problem(float(w[-1])), w[:-1], degree)
+    problem, z = refined(system.problem(float(w[-1])), w[:-1], degree)
     w = np.append(z, w[-1])
     return system.moved(problem, w), w
 
@@ -92,8 +102,7 @@ def make_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     """The point of the boundary with solved unknowns ``w``."""
     chute = system.sweep.chute_at(float(w[-1]))
     problem = system.problem(float(w[-1]))
-    problem = replace(problem, model=replace(problem.model, chute=chute))
-    z = w[:-1]
+    problem, z = unpinned(replace(problem, model=replace(problem.model, chute=chute)), w[:-1])
     solution = Solution(problem.state(z).macroscopic(), error, SolverStatus.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 

@@ -11,8 +11,8 @@ import numpy as np
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
 from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
 from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
-from chuteflow.bifurcations.starting_points import FOLDS, HELD
-from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
+from chuteflow.bifurcations.starting_points import FOLDS, HELD, on_grid_of
+from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import TracedBoundary, trace_boundary
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.ranges import SearchRange
@@ -71,8 +71,7 @@ def find_range_edges(found: BoundarySet) -> list[Boundary]:
         lines: list[TracedBoundary] = []
         for value, branches in zip(found.sampled, found.families, strict=True):
             for solution in _ends(branches, condition):
-                w = np.append(solution.z, value)
-                system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+                system, w = on_grid_of(sweep, condition, value, solution)
                 point = solve_boundary_point(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
                     lines.append(trace_boundary(point, wider, found.tolerance))

@@ -16,7 +16,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, Linearisation, TestFunction
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, TestFunction
+from chuteflow.bifurcations.grids import carried_to, pinned
 from chuteflow.bifurcations.points import BoundaryPoint, estimate_shift, solve_across, solve_boundary_point
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.paths import solve_between
@@ -26,7 +27,7 @@ from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
 from chuteflow.numerics.roots import bisect
-from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
+from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import LOSS, WORK, model
 from chuteflow.steady.solver import Condition, Solution, resolve
 
@@ -41,9 +42,11 @@ _BEYOND, _BESIDE = 0.02, 1.0
 _HALVINGS = 6
 #: A boundary beside the branches is searched for as far as so many times the distance to go to it.
 _FARTHER = 1.5
-#: A step towards it covers at most this fraction of the distance at once, so many times, with flows solved to this
-#: tolerance, and ends where so small a fraction is left.
+#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a share is left.
 _STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+#: Nodes of the grid of a flow at most.
+MOST_NODES = 640
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
 #: Net loss below this is none.
@@ -89,10 +92,10 @@ def find_on_branches(
     """Every point of the boundary on branches of flows at one value of the parameter, and points beside them, as
     far as ``reach`` in the parameter, where a branch comes near to the condition and does not meet it."""
     for branch in branches:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(branch)]
         if isinstance(condition, Fold):
             for turn in branch.turns(condition.which, tolerance):
-                if turn.point.solution.problem.breaks == WHOLE:
+                if followed(turn.point.solution):
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
             yield from _zeros(sweep, condition, value, samples, tolerance)
@@ -102,9 +105,14 @@ def find_on_branches(
                 yield point
 
 
-def _in_one_piece(branch: TracedBranch) -> list[Solution]:
-    """The flows of a branch that one grid resolves: boundaries are followed on such."""
-    return [solution for solution in branch.solutions if solution.problem.breaks == WHOLE]
+def _among(branch: TracedBranch) -> list[Solution]:
+    """The flows of a branch that a grid of a few pieces resolves: boundaries are followed on such."""
+    return [solution for solution in branch.solutions if followed(solution)]
+
+
+def followed(solution: Solution) -> bool:
+    """Whether boundaries are followed among flows like this one."""
+    return len(solution.problem.grid.nodes) <= MOST_NODES
 
 
 def trace_branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
@@ -116,9 +124,17 @@ def _from_flow(
     sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution, tolerance: float
 ) -> BoundaryPoint:
     """The point of the boundary at a value of the parameter, from its flow."""
-    w = np.append(solution.z, value)
-    system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+    system, w = on_grid_of(sweep, condition, value, solution)
     return solve_boundary_point(system, w, HELD, value, tolerance)
+
+
+def on_grid_of(
+    sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution
+) -> tuple[BoundarySystem, Array]:
+    """The system on the grid of a flow, and the flow on it."""
+    problem, z = pinned(solution.problem, solution.z)
+    w = np.append(z, value)
+    return BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w), w
 
 
 def _zeros(
@@ -182,12 +198,11 @@ def _near(
     tolerance: float,
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
-    one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
-    fraction = 1.0 - sigma if one is last.solution else sigma
-    problem = one.problem
-    _, matrix = other.problem.transferred(problem.degree, problem.stretch)
-    moved = np.concatenate([matrix @ other.z[:-2], other.z[-2:]])
-    w = np.append(one.z + fraction * (moved - one.z), value)
+    one, other = sorted((first.solution, last.solution), key=lambda s: -len(s.problem.grid.nodes))
+    share = 1.0 - sigma if one is last.solution else sigma
+    problem, z = pinned(one.problem, one.z)
+    moved = carried_to(other.problem, other.z, problem)
+    w = np.append(z + share * (moved - z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
         point = solve_boundary_point(system, w, HELD, value, tolerance)
@@ -235,8 +250,7 @@ def _beside(
     plane = Condition.plane(chord, solution.macroscopic)
     at = value
     for _ in range(_MOST_STEPS):
-        w = np.append(solution.z, at)
-        system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+        system, w = on_grid_of(sweep, condition, at, solution)
         ahead = at + estimate_shift(system, w, row)
         if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
             return None
@@ -263,9 +277,10 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
 
 
 def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution) -> _SampledFlow:
-    here, beyond = sweep.models(value)
-    degree, stretch = solution.problem.degree, solution.problem.stretch
-    at = Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
+    problem, z = pinned(solution.problem, solution.z)
+    stretch = float(np.reshape(problem.stretch, ()))
+    system = BoundarySystem(sweep, condition, problem.degree, stretch, problem.breaks, problem.pins)
+    at = system.local(np.append(z, value))
     f, gradient = condition.along_branch(at)
     return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
@@ -292,13 +307,12 @@ def find_along_branches(
 ) -> Iterator[BoundaryPoint]:
     """One point of each stretch of the branches of flows at a value of the parameter that is boundary throughout."""
     for branch in branches:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
+        samples = [_sample(sweep, condition, value, solution) for solution in _among(branch)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             solution = samples[(begin + end) // 2].solution
-            w = np.append(solution.z, value)
-            system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
+            system, w = on_grid_of(sweep, condition, value, solution)
             yield solve_across(system, w, tolerance)
 
 

@@ -2,7 +2,8 @@
 
 # notation: z unknowns of a flow (n+3,), lambda the second parameter.
 
-Unknowns (z, lambda); equations: the steady problem and one condition. Turning points in lambda are nothing
+Unknowns (z, lambda), where z may have those of pinned breaks (:mod:`chuteflow.steady.collocation`); equations: the
+steady problem and one condition. Turning points in lambda are nothing
 special to the continuation of :mod:`chuteflow.numerics.continuation`.
 """
 
@@ -14,9 +15,10 @@ from functools import lru_cache
 import numpy as np
 
 from chuteflow.bifurcations.conditions import Linearisation, TestFunction
+from chuteflow.bifurcations.grids import carried_to, fitted
 from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import Collocation
+from chuteflow.steady.collocation import WHOLE, Collocation
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.model import Model, model_along
 from chuteflow.steady.solver import default_stretch
@@ -26,6 +28,8 @@ from chuteflow.theory.constitutive import Law
 _SPAN = 6.0
 #: Weight of the gradient of the potential in the inner product.
 _OF_GRADIENT = 0.02
+#: Weight of the unknowns of pinned breaks, and the part of the range over which kinks are differentiated.
+_OF_BREAKS, _STEP = 0.01, 1e-6
 #: Decay of the coefficients between which a grid is kept along a boundary.
 _RESOLVED, _WASTED = 1e-7, 1e-13
 #: The stretch is renewed when it is off by more.
@@ -60,7 +64,7 @@ class SecondParameter:
         return self.low - margin <= value <= self.high + margin
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _models(sweep: SecondParameter, registered: Law, value: float) -> tuple[Model, Model]:
     del registered  # known here to tell what is remembered of one law from that of another
     return model_along(sweep.chute, sweep.name, value)
@@ -68,7 +72,8 @@ def _models(sweep: SecondParameter, registered: Law, value: float) -> tuple[Mode
 
 @dataclass(frozen=True, eq=False)
 class BoundarySystem:
-    """The steady problem and one condition, on a grid of ``degree`` and ``stretch``; unknowns (z, lambda).
+    """The steady problem and one condition, on a grid of ``degree`` and ``stretch`` with ``breaks`` and ``pins`` as
+    in :class:`chuteflow.steady.collocation.Collocation`; unknowns (z, lambda).
 
     The inner product is that of the plane (theta at the surface, ln M), with a little of the integral of g^2 over the
     overburden, so that neither resolution nor stretch changes the path, and with the parameter, whose range counts as
@@ -79,23 +84,38 @@ class BoundarySystem:
     condition: TestFunction
     degree: int
     stretch: float
+    breaks: tuple[float, ...] = WHOLE
+    pins: tuple[tuple[int, int], ...] = ()
 
     @property
     def weights(self) -> Array:
         """Of the unknowns, (n+4,)."""
         problem = self.problem(self.sweep.low)
         by_quadrature = problem.grid.weights * problem.share[1]
-        return np.concatenate([_OF_GRADIENT * by_quadrature, [1.0, 1.0, self.sweep.weight]])
+        return np.concatenate(
+            [_OF_GRADIENT * by_quadrature, np.full(len(self.pins), _OF_BREAKS), [1.0, 1.0, self.sweep.weight]]
+        )
 
     def problem(self, value: float) -> Collocation:
         """The steady problem at a value of the parameter."""
-        return Collocation(self.sweep.models(value)[0], self.degree, self.stretch)
+        return self._of(self.sweep.models(value)[0])
+
+    def _of(self, model: Model) -> Collocation:
+        return Collocation(model, self.degree, self.stretch, self.breaks, self.pins)
 
     def local(self, w: Array) -> Linearisation:
         """Everything at the unknowns ``w`` (n+4,)."""
-        here, beyond = self.sweep.models(float(w[-1]))
-        stepped = Collocation(beyond, self.degree, self.stretch)
-        return Linearisation.at(Collocation(here, self.degree, self.stretch), stepped, w[:-1])
+        value = float(w[-1])
+        here, beyond = self.sweep.models(value)
+        kinks = self._kinks_by_parameter(value) if self.pins else None
+        return Linearisation.at(self._of(here), self._of(beyond), w[:-1], kinks)
+
+    def _kinks_by_parameter(self, value: float) -> Array:
+        """Derivatives of the pinned ln x with respect to the parameter: breaks are known at real values alone."""
+        step = _STEP * (self.sweep.high - self.sweep.low)
+        which = [kink for _, kink in self.pins]
+        low, high = (self.sweep.models(value + side)[0].kinks_at(which) for side in (-step, step))
+        return (high - low) / (2.0 * step)
 
     def residual_and_jacobian(self, w: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""
@@ -112,19 +132,31 @@ class BoundarySystem:
 
     def adapted(self, w: Array, tangent: Array) -> tuple[BoundarySystem, Array, Array] | None:
         """Another grid or stretch where the flow asks for it, and other borders where the condition does."""
-        other = _suited(self.problem(float(w[-1])), w[:-1])
+        problem, z = self.problem(float(w[-1])), w[:-1]
+        other = _suited(problem, z)
         if other is None:
             at = self.local(w)
             if self.condition.suits(at):
                 return None
             return replace(self, condition=self.condition.based(at)), w, tangent
-        problem, matrix = other
-        moved, direction = (np.concatenate([matrix @ v[:-3], v[-3:]]) for v in (w, tangent))
-        return self.moved(problem, moved), moved, direction
+        moved = np.append(carried_to(problem, z, other), w[-1])
+        direction = np.append(carried_to(problem, tangent[:-1], other, z), tangent[-1])
+        return self.moved(other, moved), moved, direction
+
+    def refitted(self, w: Array) -> tuple[BoundarySystem, Array] | None:
+        """The system on pieces that meet where the flow passes kinks of the law now, and the point there; None where it
+        is that already."""
+        problem = self.problem(float(w[-1]))
+        other = fitted(problem, w[:-1])
+        if other is None:
+            return None
+        moved = np.append(carried_to(problem, w[:-1], other), w[-1])
+        return self.moved(other, moved), moved
 
     def moved(self, problem: Collocation, w: Array) -> BoundarySystem:
         """The system on the grid of ``problem``, where ``w`` is about the solution."""
-        other = replace(self, degree=problem.degree, stretch=float(np.reshape(problem.stretch, ())))
+        stretch = float(np.reshape(problem.stretch, ()))
+        other = replace(self, degree=problem.degree, stretch=stretch, breaks=problem.breaks, pins=problem.pins)
         return replace(other, condition=self.condition.based(other.local(w)))
 
     def tangent(self, w: Array) -> Array:
@@ -136,8 +168,8 @@ class BoundarySystem:
         return v[-1] / root
 
 
-def _suited(problem: Collocation, z: Array) -> tuple[Collocation, Array] | None:
-    """A finer or coarser grid, or another stretch, where the flow asks for it, with the matrix that takes g to it."""
+def _suited(problem: Collocation, z: Array) -> Collocation | None:
+    """A finer or coarser grid, or another stretch, or other breaks, where the flow asks for it."""
     state = problem.state(z)
     decay = tail(problem.grid, state.y + 1e-30)
     place = DEGREES.index(problem.degree)
@@ -145,9 +177,9 @@ def _suited(problem: Collocation, z: Array) -> tuple[Collocation, Array] | None:
         place += 1
     elif decay < _WASTED and place > 0:
         place -= 1
-    stretch = default_stretch(problem.model, float(state.mass[0]), float(np.exp(state.log_t[0])))
-    if abs(stretch - problem.stretch) < _STRETCH_OFF:
-        if DEGREES[place] == problem.degree:
-            return None
-        stretch = problem.stretch
-    return problem.transferred(DEGREES[place], stretch)
+    stretch = default_stretch(problem.model, float(state.mass[0]), float(np.exp(state.surface)))
+    off = abs(stretch - problem.stretch) >= _STRETCH_OFF
+    other = fitted(problem, z, stretch if off else None)
+    if other is None:
+        return None if DEGREES[place] == problem.degree else replace(problem, degree=DEGREES[place])
+    return replace(other, degree=DEGREES[place]) if other.breaks == problem.breaks == WHOLE else other

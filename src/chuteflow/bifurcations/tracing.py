@@ -9,6 +9,7 @@ import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
 from chuteflow.bifurcations.edges import find_exit
+from chuteflow.bifurcations.grids import carried_to
 from chuteflow.bifurcations.points import BoundaryPoint, make_point, refine_grid, solve_boundary_point
 from chuteflow.bifurcations.starting_points import HELD
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
@@ -37,6 +38,9 @@ _BESIDE, _SAME = 0.3, 1e-6
 _ROUGHLY, _ON_CHORD, _SAMPLED = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
+#: Steps by which a boundary is carried over a place where a flow comes to a break of the law, at most so often, and by
+#: how much of the step the point may lie beside the tangent.
+_LEAP, _LEAPS, _ASTRAY = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4), 12, 0.5
 #: A parameter that changes less, per arclength, does not change.
 _NO_RATE = 1e-10
 
@@ -136,9 +140,37 @@ def _side(
     control: ContinuationSettings,
     notice: Callable[[], object],
 ) -> Side[BoundaryPoint]:
+    side = Side(start)
+    kinked = start.system.problem(start.value).model.kinks.size > 0
+    for leaps in range(_LEAPS):
+        lost = _followed(side, start, tangent, within, tolerance, control, notice, closes=leaps == 0)
+        # Just where the flow comes to a break of the law, or leaves it, neither grid serves.
+        leapt = _leapt(side, within, tolerance) if lost and kinked else None
+        if leapt is None:
+            break
+        start, tangent = leapt
+        side.add(start)
+    return side
+
+
+def _followed(
+    side: Side[BoundaryPoint],
+    start: BoundaryPoint,
+    tangent: Array,
+    within: SearchRange,
+    tolerance: float,
+    control: ContinuationSettings,
+    notice: Callable[[], object],
+    *,
+    closes: bool,
+) -> bool:
+    """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to
+    the start again."""
     system = start.system
+    side.stop("")
     path = trace(system, start.w, direction=system.weights * tangent, control=control)
     first: list[CurvePoint[BoundarySystem]] = []
+    lost: list[bool] = []
 
     def extend(
         side: Side[BoundaryPoint], before: CurvePoint[BoundarySystem] | None, point: CurvePoint[BoundarySystem]
@@ -150,20 +182,46 @@ def _side(
         if point.step == 0.0:
             return  # the same point on another grid, or with other borders
         try:
-            _extend(side, first[0], before, point, within, tolerance)
+            _extend(side, first[0] if closes else None, before, point, within, tolerance)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
             side.stop("it is lost in rounding a little further on")
+            lost.append(True)
 
-    side = follow_side(path, Side(start), extend)
+    follow_side(path, side, extend)
     if path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange):
         side.stop("the change goes over to another place in the flow, at a corner")
-    return side
+        return False
+    return bool(lost) or path.status.failed
+
+
+def _leapt(side: Side[BoundaryPoint], within: SearchRange, tolerance: float) -> tuple[BoundaryPoint, Array] | None:
+    """A point a little further on than a side leads, and the tangent there, if there is one in about its direction."""
+    if len(side.points) < 2:
+        return None
+    before, last = side.points[-2:]
+    system = last.system
+    root = np.sqrt(system.weights[-3:])
+    tangent = system.tangent(last.w)
+    tangent *= np.sign((root**2 * tangent[-3:]) @ (last.w - _carried(before.w, before.system, system))[-3:])
+    tangent /= float(np.linalg.norm(root * tangent[-3:]))
+    for step in _LEAP:
+        w = last.w + step * tangent
+        row = root**2 * tangent[-3:]
+        try:
+            found = solve_boundary_point(system, w, row, float(row @ w[-3:]), tolerance)
+        except SolveError:
+            continue
+        astray = float(np.linalg.norm(root * (found.w[-3:] - w[-3:])))
+        if astray < _ASTRAY * step and within.contains(found.flow.solution.macroscopic):
+            onward = found.system.tangent(found.w)
+            return found, onward * np.sign((root**2 * onward[-3:]) @ tangent[-3:])
+    return None
 
 
 def _extend(
     side: Side[BoundaryPoint],
-    first: CurvePoint[BoundarySystem],
+    first: CurvePoint[BoundarySystem] | None,
     before: CurvePoint[BoundarySystem],
     point: CurvePoint[BoundarySystem],
     within: SearchRange,
@@ -183,11 +241,23 @@ def _extend(
         side.stop(end)
         return
     _add_turn(side, before, point, tolerance)
-    if len(side.points) > 3 and _returned(first, before, point):
+    if first is not None and len(side.points) > 3 and _returned(first, before, point):
         side.stop("the boundary closes on itself", closed=True)
         return
     row = (point.system.weights * point.tangent)[-3:]
-    side.add(solve_boundary_point(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
+    found = solve_boundary_point(point.system, point.z, row, float(row @ point.z[-3:]), tolerance)
+    if point.system.pins and _turned_back(side, found):
+        raise SolveError("a boundary turns back where its flows come to a break of the law")
+    side.add(found)
+
+
+def _turned_back(side: Side[BoundaryPoint], point: BoundaryPoint) -> bool:
+    """Whether the way to a point leads back against that to the last one."""
+    if len(side.points) < 2:
+        return False
+    root = np.sqrt(point.system.weights[-3:])
+    a, b, c = (root * p.w[-3:] for p in (*side.points[-2:], point))
+    return float((b - a) @ (c - b)) < 0.0
 
 
 def _add_turn(
@@ -283,5 +353,8 @@ def _returned(
 def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:
     """Unknowns on the grid of another system."""
     value = float(w[-1])
-    _, matrix = system.problem(value).transferred(other.degree, other.stretch)
-    return np.concatenate([matrix @ w[:-3], w[-3:]])
+    if (system.degree, system.stretch, system.breaks, system.pins) == (
+        other.degree, other.stretch, other.breaks, other.pins,
+    ):  # fmt: skip
+        return w
+    return np.append(carried_to(system.problem(value), w[:-1], other.problem(value)), value)

@@ -12,7 +12,6 @@ import numpy as np
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.model import LOSS, WORK, Model
-from chuteflow.theory.bases import BASES
 from chuteflow.theory.hot import LAMBDA_C, dilute, hot_parameters
 
 _NAMES = ("Q", "h", "M", "T_surface")
@@ -45,11 +44,11 @@ def explain_imbalance(model: Model) -> str:
                 "remain, and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
-    if model.beta != 0.0 or model.base != BASES["richman"]:
-        # The hot limit is known for laws with a temperature far above and for the base of the paper.
+    if model.beta != 0.0:
+        # The hot limit is known for laws with a temperature far above.
         return "no flow balances the energy gained and lost"
     limit = dilute(model.law, chute.restitution, chute.slope)
-    hot = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
+    hot = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope, model.base)
     if hot.delta > 0.0 and hot.F21 > 0.0 and hot.lambda_ > LAMBDA_C:
         return (
             f"the slope is too steep: lambda = {hot.lambda_:.4g} > 3, so that the base gives more energy "

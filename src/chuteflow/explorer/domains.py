@@ -51,7 +51,7 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     )
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
-    if plane.chute.surface == "free" and not asked.coarse:
+    if plane.hot_known and not asked.coarse:
         hot = classify_column(place, partial(classify_hot, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
         parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(

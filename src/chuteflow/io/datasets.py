@@ -38,7 +38,7 @@ _STATUS = tuple(status.name.lower() for status in SolverStatus)
 CLASSES: dict[str, tuple[str, dict[int, str]]] = {
     "hot": (
         "hot, dilute flows by the closed form of section 4",
-        {-1: "not_known_with_interface_conditions", 0: "no_hot_flows", 1: "hot_flows"},
+        {-1: "not_known_in_closed_form", 0: "no_hot_flows", 1: "hot_flows"},
     ),
     "exists": ("any flow in the range searched", {0: "no_flow", 1: "flows"}),
     "most": ("largest number of flows that share one mass flux", {}),

@@ -55,9 +55,9 @@ class Domain(Result):
     """Classes over ``plane``, on a grid of cells and by their outlines.
 
     ``x`` (m,) and ``y`` (n,) are the centres of the cells. All else on the grid is (n, m), row by row from the
-    lowest y. ``tolerance`` is the fraction of either axis to which boundaries are known. ``columns`` are those from
-    which grid and outlines are read, and ``hot_columns`` those of the closed form of section 4, none with the
-    interface conditions, which that leaves out.
+    lowest y. ``tolerance`` is the share of either axis to which boundaries are known. ``columns`` are those from
+    which grid and outlines are read, and ``hot_columns`` those of the closed form of section 4, none where that
+    leaves out the chutes: with the interface conditions, and under laws without a temperature far above.
     """
 
     plane: ParameterPlane
@@ -96,7 +96,7 @@ class Domain(Result):
 
     @cached_property
     def hot(self) -> NDArray[np.int8]:
-        """Whether there are hot flows, in closed form: 1, 0, or -1 where the theory does not say (interface)."""
+        """Whether there are hot flows, in closed form: 1, 0, or -1 where that is not known (see ``hot_columns``)."""
         if not self.hot_columns:
             return np.full((len(self.y), len(self.x)), -1, dtype=np.int8)
         return self._on_grid(self.hot_columns, HOT_CODES.index("hot")).astype(np.int8)
@@ -222,7 +222,7 @@ def domain(
     plane = ParameterPlane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
         columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
-    hot_columns = _hot_columns(plane, tolerance) if chute.surface == "free" else ()
+    hot_columns = _hot_columns(plane, tolerance) if plane.hot_known else ()
     return Domain.on_cells(plane, size, tolerance, tuple(columns), tuple(hot_columns))
 
 

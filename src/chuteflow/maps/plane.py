@@ -7,7 +7,7 @@ one grid of trajectories.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,8 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import model
-from chuteflow.theory.bases import require_richman
-from chuteflow.theory.constitutive import Law, require_limit
+from chuteflow.theory.bases import base
+from chuteflow.theory.constitutive import Law, dilute_drift, require_height
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
 from chuteflow.trajectories.refining import TrajectoryGrid, integrate_trajectories_from, starting_temperatures
 from chuteflow.trajectories.tables import ENTRIES, envelope
@@ -94,16 +94,23 @@ class ParameterPlane:
     def __post_init__(self) -> None:
         if self.x.name == self.y.name:
             raise InputError(f"both axes are {self.x.name}: give two parameters")
-        for x in (self.x.low, self.x.high):
-            for y in (self.y.low, self.y.high):
-                corner = self.at(x, y)
-                require_richman(corner.base, "maps are")
-                require_limit(corner.law, corner.restitution, corner.slope, "maps need")
+        for corner in self._corners:
+            if corner.surface == "free":
+                require_height(corner.law, corner.restitution, corner.slope)
 
     def at(self, x: float, y: float) -> Chute:
         """The chute at values of the two parameters."""
         changed: dict[str, Any] = {self.x.name: float(x), self.y.name: float(y)}
         return replace(self.chute, **changed)
+
+    @property
+    def _corners(self) -> list[Chute]:
+        return [self.at(x, y) for x in (self.x.low, self.x.high) for y in (self.y.low, self.y.high)]
+
+    @cached_property
+    def hot_known(self) -> bool:
+        """Whether hot flows are known in closed form: on the half-line, under laws with a temperature far above."""
+        return all(c.surface == "free" and dilute_drift(c.law, c.e, c.slope) == 0.0 for c in self._corners)
 
     @property
     def transposed(self) -> bool:
@@ -141,7 +148,7 @@ def classify(plane: ParameterPlane, outer: float, inner: float) -> Code:
 def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
     """The class of the point at fractions of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
     found = _kinds(plane, plane.chute_at(outer, inner))
-    hot = classify_hot(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    hot = classify_hot(plane, outer, inner)[0] if plane.hot_known else -1
     return (hot, found.most, found.families, found.interior, found.density)
 
 
@@ -164,7 +171,7 @@ def classify_hot(plane: ParameterPlane, outer: float, inner: float) -> Code:
     chute = plane.chute_at(outer, inner)
     closure = chute.law
     limit = _dilute(closure, chute.restitution, chute.slope if closure.knows_slope else 0.0)
-    found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
+    found = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope, base(chute.base))
     gained, lost = found.F21 > 0.0, found.delta > 0.0
     strong = gained and lost
     return (
@@ -190,13 +197,13 @@ def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[Traject
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:
             fractions = np.linspace(0.0, 1.0, _BETWEEN)
-            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in fractions]
+            served = [replace(one, **{axis.name: float(axis.at(s))}) for one in served for s in fractions]
     within = plane.within
     temperature = starting_temperatures(within.coldest, within.hottest)
     if plane.temperatures:
         apart = np.abs(np.log(temperature[:, None] / np.array(plane.temperatures))).min(axis=1)
         temperature = np.unique(np.concatenate([temperature[apart > _SAME], plane.temperatures]))
-    others = envelope([model(base) for base in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
+    others = envelope([model(one) for one in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
     grid = integrate_trajectories_from(model(chute), others, temperature, within.deepest)
     return grid, bound_extremes(grid)
 

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Intervals that halve towards a singular end.
+_HALVED = 120
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -206,6 +209,32 @@ def interpolation_matrix(g: AnyGrid, points: Array) -> Array:
     rows = hit.any(axis=1)
     matrix[rows] = hit[rows]
     return cast(Array, matrix / matrix.sum(axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=64)
+def singular_weights(degree: int, beta: complex) -> Array:
+    """Weights (n+1,), for values f at the nodes of :func:`grid`, of the integral of f over [0, 1], where f is a
+    polynomial times s^(-beta), 0 <= beta < 1: exact for the polynomial through s^beta f; a complex ``beta``
+    differentiates them."""
+    g = grid(degree)
+    nodes, weights = np.polynomial.legendre.leggauss(degree + 1)
+    # The polynomial times s^(-beta) on intervals that halve towards 0, and on what is left a constant times it.
+    ends = 0.5 ** np.arange(_HALVED + 1.0)
+    points = ends[1:, None] + 0.25 * ends[:-1, None] * (nodes + 1.0)
+    measure = 0.25 * ends[:-1, None] * weights * points**-beta
+    product = measure.ravel() @ interpolation_matrix(g, points.ravel())
+    product[0] += ends[-1] ** (1.0 - beta) / (1.0 - beta)
+    out = product * g.nodes**beta
+    # f is infinite at 0, s^beta f is not: its limit is that of the polynomial through the other nodes.
+    out[1:] += product[0] * _at_zero(g) * g.nodes[1:] ** beta
+    out[0] = 0.0
+    out.setflags(write=False)
+    return cast(Array, out)
+
+
+def _at_zero(g: Grid) -> Array:
+    """What the polynomial through the values at all nodes but the first has at 0, (n,)."""
+    return -g.barycentric[1:] / g.barycentric[0]
 
 
 @lru_cache(maxsize=256)

@@ -40,15 +40,17 @@ class FunctionTable:
         """What compiled loops evaluate it from: ``coefficients`` and ``edges``."""
         return self.coefficients, self.edges
 
-    def __call__(self, x: Array) -> tuple[Array, Array]:
-        """Values and derivatives, each (m,) + x.shape; a complex ``x`` belongs to the piece of its real part."""
+    def __call__(self, x: Array, side: Array | None = None) -> tuple[Array, Array]:
+        """Values and derivatives, each (m,) + x.shape; a complex ``x`` belongs to the piece of its real part, or to
+        that of ``side`` where that is given: at a break there are two."""
         degree, pieces, _ = self.coefficients.shape
         scale = pieces / (self.upper - self.lower)
         # fmax and fmin turn a NaN into an end, so that the index exists; whoever made the NaN still has it.
         position = (np.fmin(np.fmax(x, self.lower), self.upper) - self.lower) * scale
         index = np.minimum(position.real.astype(np.intp), pieces - 1)
         if self.edges.size:
-            index = np.minimum(np.searchsorted(self.edges[1:], position.real, side="right"), pieces - 1)
+            told = position.real if side is None else (np.clip(side, self.lower, self.upper) - self.lower) * scale
+            index = np.minimum(np.searchsorted(self.edges[1:], told, side="right"), pieces - 1)
             low, high = self.edges[index], self.edges[index + 1]
             t = (2.0 * (position - low) / (high - low) - 1.0)[..., None]
         else:

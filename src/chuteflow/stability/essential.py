@@ -37,7 +37,7 @@ def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:
     profile = flow.at_overburden(fraction)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, flow.law
-    g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
+    g = chosen.of_density(nu, chute.restitution, chute.slope)
     warming = g.density_conductivity / g.conductivity
     # dp/dnu where no heat flows
     stiffness = (g.compressibility + nu * (g.compressibility_slope + g.compressibility * warming)) * T

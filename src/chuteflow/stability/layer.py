@@ -12,7 +12,7 @@ construction. (2.1)-(2.3) become
     (3/2) dT/dt = q' + P_zz w' + P_xz u' - gamma/nu
 
 Stresses and heat flux vanish at m = 0 by themselves, so that the free surface needs no condition (2.16). At the
-base w = 0, and traction and heat flux are Richman's (2.9)-(2.15): the traction is affine in u', which is
+base w = 0, and traction and heat flux are those of the base, (2.9)-(2.15): the traction is affine in u', which is
 eliminated, so that both follow from u, w' and T there. They enter as the boundary terms of the weak form: on
 Lobatto's nodes, where sums integrate by parts exactly, the energy balance holds then for the discrete equations.
 A steady flow has S = 1, w = 0.
@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +33,9 @@ from chuteflow.numerics.legendre import LobattoGrid, lobatto
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import stretch_map
 from chuteflow.steady.flow import Flow
-from chuteflow.theory import boundary
-from chuteflow.theory.bases import require_richman
-from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
-from chuteflow.theory.transport import Material, Vector, traction
+from chuteflow.theory import bases
+from chuteflow.theory.constitutive import Coefficients, Law
+from chuteflow.theory.transport import AtBase, Material
 
 #: Degree of the grid in m.
 DEGREE = 40
@@ -122,7 +120,6 @@ class Layer:
                 "the interface is known only for steady flows: time dependence needs the free surface, give "
                 "--surface free"
             )
-        require_richman(flow.chute.base, "disturbed flows are")
         Material(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
         return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
@@ -250,26 +247,22 @@ class Layer:
     def _coefficients(self, nu: Array, rate: Array | None = None) -> Coefficients:
         """The coefficients of the law where the shear rate over nu sqrt(T) is ``rate``; without one, those that do
         not depend on it."""
-        room = 1.0 - nu / self.law.densest
-        if rate is not None and self.law.knows_slope:
-            at_shear: Any = self.law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
-            return at_shear(nu, room, self.chute.restitution, rate)
-        return self.law.coefficients(nu, room, self.chute.restitution, self.chute.slope)
+        return self.law.of_density(nu, self.chute.restitution, self.chute.slope, rate)
 
     def _at_base(self, nu: Array, u: Array, w_z: Array, T: Array, normal: Array) -> tuple[Array, Array, Array]:
         """P_xz and q at the base, and the energy lost to it, (2.9)-(2.15)."""
         chute, root_T = self.chute, np.sqrt(T)
-        g = self._coefficients(nu)
-        bumps = 1.0 + WALL_CONTACT * (1.0 + 0.625 / (nu * g.radial))
+        g, on = self._coefficients(nu), bases.base(chute.base)
 
-        def touched(u_z: float) -> Vector:
+        def exchange(u_z: float) -> tuple[Array, Array]:
+            """M_x and the loss."""
             grad_u = ((0.0, 0.0, u_z), (0.0, 0.0, 0.0), (0.0, 0.0, w_z))
-            return traction((-u, 0.0, 0.0), root_T, grad_u, bumps, chute.roughness)
+            at = AtBase(nu, g.radial, (u, 0.0, 0.0), root_T, grad_u, normal)
+            (along, _, _), loss = on.exchange(at, chute.roughness, chute.wall_restitution)
+            return along, loss
 
-        along, _, up = touched(0.0)
-        strength = normal / up
-        pull = strength * (touched(1.0)[0] - along)  # dM_x/du_z
+        along, loss = exchange(0.0)
+        pull = exchange(1.0)[0] - along  # dM_x/du_z
         viscosity = g.viscosity * root_T
-        shear = viscosity * strength * along / (viscosity + pull)
-        loss = strength * root_T * boundary.base_loss(chute.wall_restitution, chute.roughness)
+        shear = viscosity * along / (viscosity + pull)
         return shear, -shear * u - loss, loss

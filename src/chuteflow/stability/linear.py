@@ -35,7 +35,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import BaseState
-from chuteflow.theory.bases import require_richman
+from chuteflow.theory import bases
 from chuteflow.theory.constitutive import Coefficients
 from chuteflow.theory.transport import Fields, Material, Motion, Vector, base_conditions, motion
 
@@ -133,7 +133,6 @@ def grains(base: BaseState) -> Material:
             f"stability with the surface {chute.surface!r}: its conditions are known for a steady, level interface "
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
-    require_richman(chute.base, "disturbed flows are")
     return Material(base.flow.law, chute.restitution, chute.slope)
 
 
@@ -174,7 +173,7 @@ def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
     matrix = np.concatenate([force.slope for force in moving.forces]).astype(complex)
     weights = np.concatenate([np.ones(base.points), *(inertia.value for inertia in moving.inertia[1:])])
     chute = base.flow.chute
-    floor = base_conditions(moving, chute.roughness, chute.wall_restitution)
+    floor = base_conditions(moving, bases.base(chute.base), chute.roughness, chute.wall_restitution)
     P, q = moving.pressure, moving.heat_flux
     ceiling = (P[0][2], P[1][2], P[2][2], q[2])
     for field, below, above in zip((ALONG, ACROSS, UP, HEAT), floor, ceiling, strict=True):
@@ -225,5 +224,5 @@ def _at_top(base: BaseState) -> tuple[Coefficients, float]:
     """The coefficients of the law, and sqrt(T), at the top."""
     chute, law = base.flow.chute, base.flow.law
     nu = base.profile.volume_fraction[:1]
-    g = law.coefficients(nu, 1.0 - nu / law.densest, chute.restitution, chute.slope)
+    g = law.of_density(nu, chute.restitution, chute.slope)
     return g, float(np.sqrt(base.profile.granular_temperature[0]))

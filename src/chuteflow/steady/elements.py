@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,7 +30,9 @@ _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
 #: Ends of elements in the first one, in parts of it, where T has no limit at the surface.
-_GRADED = 0.5 ** np.arange(48, 0, -1.0)
+_GRADED = 0.4 ** np.arange(12, 0, -1.0)
+#: Ends of pieces of a grid there, in parts of the first of the others, which are not smaller than the second number.
+_COARSE, _SMOOTH = 0.125 ** np.arange(8, 0, -1.0), 1e-3
 #: A piece of a grid is not shorter than this.
 _APART = 1e-6
 #: Elements at most of the coarser mesh, and pieces of a grid: no more than elements of the finer mesh.
@@ -50,6 +53,16 @@ def _gauss() -> tuple[Array, Array, Array, Array]:
 
 
 _GAUSS, _INTEGRALS, _DIFFERENCES, _CARDINAL = _gauss()
+
+
+@lru_cache(maxsize=16)
+def _rule(beta: float) -> Array:
+    """Gauss points, weights, and those for the integral of P dz in the first element (3, STAGES), where its integrand
+    is a smooth function times t^(-beta)."""
+    moments = 1.0 / (np.arange(1, STAGES + 1) - beta)
+    powers = np.arange(STAGES)
+    product = np.linalg.solve(_GAUSS[0] ** powers[:, None], moments) * _GAUSS[0] ** beta
+    return np.stack([*_GAUSS, _GAUSS[1] if beta == 0.0 else product])
 
 
 def _graded(breaks: Array) -> Array:
@@ -120,8 +133,9 @@ class Elements:
                 yield problem, z
         inner = self.breaks[_PER_PIECE:-_PER_PIECE:_PER_PIECE]
         if self.model.unlimited:
-            inner = np.concatenate([self.breaks[1] * 2.0 ** np.arange(0, 40, 4), inner])
-            inner = np.unique(inner[inner < 0.9])
+            # Where T has no limit theta is smooth but for terms like s^(1 + beta).
+            inner = inner[inner > _SMOOTH]
+            inner = np.concatenate([inner[:1] * _COARSE, inner]) if inner.size else _COARSE
         if pins.size:
             inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
@@ -161,11 +175,25 @@ class Elements:
         return found.on(_graded(breaks)) if self.model.unlimited else found
 
     @property
+    def _rule(self) -> Array:
+        """What integrals are taken with, see :func:`_rule`."""
+        return _rule(self.model.beta if self.model.unlimited else 0.0)
+
+    @property
     def inner_places(self) -> Array:
         """The ends of the grid, and the Gauss points of all elements between them, ascending."""
         s = kernel.places(self.breaks, _GAUSS[0])
         inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
         return np.concatenate([s[:1], inner, s[-1:]])
+
+    def crossings(self, levels: Array, close: float) -> Array:
+        """The places, to ``close``, at which ln x passes one of the ``levels`` (k,)."""
+        model = self.model
+        found = kernel.crossings(
+            self.breaks, self.ends, self.slopes, _CARDINAL, self.stretch, float(np.exp(self.log_mass)),
+            model.surface_stress, float(np.real(model.beta)), self.inner_places, levels, close,
+        )  # fmt: skip
+        return np.asarray(found, dtype=float)
 
     def on(self, breaks: Array) -> Elements:
         """The polynomials through values of the flow on other elements."""
@@ -184,7 +212,7 @@ class Elements:
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
         errors = np.zeros((2 if rounding else 0, 4))
         mu, step = kernel.iterate(
-            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, self._rule, _INTEGRALS, self.breaks, self.stretch,
             ends, slopes, self.log_mass, weights, value, tolerance, most, quantities, rates,
             errors,
         )  # fmt: skip
@@ -197,7 +225,7 @@ class Elements:
         (4,), change by 1; None where the condition turns."""
         change = np.empty(4)
         found = kernel.direction(
-            self.model.table.compiled, self.model.constants, _GAUSS, _INTEGRALS, self.breaks, self.stretch,
+            self.model.table.compiled, self.model.constants, self._rule, _INTEGRALS, self.breaks, self.stretch,
             self.ends, self.slopes, self.log_mass, weights, change,
         )  # fmt: skip
         return change if found else None

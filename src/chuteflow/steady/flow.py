@@ -279,7 +279,7 @@ class Flow(Result):
         nu = _density(state.x, state.f)
         # Rounding does not let grains be packed to the last.
         room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
-        contacts = nu * chosen.coefficients(nu, room, self.chute.restitution, self.chute.slope).radial
+        contacts = nu * chosen.called(chosen.coefficients, nu, room, self.chute.restitution, self.chute.slope).radial
         per_grain = problem.grid.weights / state.s_p / state.mass
         largest = self.largest_volume_fraction
         return Validity(

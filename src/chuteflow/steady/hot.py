@@ -19,7 +19,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.kinds import INVERTED, MONOTONIC, interior_kind
-from chuteflow.theory.bases import require_richman
+from chuteflow.theory.bases import base
 from chuteflow.theory.constitutive import Field
 from chuteflow.theory.hot import (
     LAMBDA_C,
@@ -133,16 +133,16 @@ def hot(chute: Chute) -> HotModel:
     """
     if chute.surface != "free":
         raise InputError(f"surface = {chute.surface!r}: the model of hot flows has the surface 'free' alone")
-    require_richman(chute.base, "the hot limit is")
+    on = base(chute.base)
     limit = dilute(chute.law, chute.restitution, chute.slope)
-    parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope)
+    parameters = hot_parameters(limit, chute.wall_restitution, chute.roughness, chute.slope, on)
     reason = parameters.obstacle
     return HotModel(
         chute=chute,
         parameters=parameters,
         solution=hot_solution(parameters.lambda_) if reason is None else None,
         reason=reason,
-        slope_bounds=slope_bounds(limit, chute.wall_restitution, chute.roughness),
+        slope_bounds=slope_bounds(limit, chute.wall_restitution, chute.roughness, on=on),
     )
 
 

@@ -24,6 +24,8 @@ STAGES = 7
 _ROUNDING = 2e-14
 #: The longest step of Newton's method, and the largest change of ln x trusted.
 _LONGEST, _HALVINGS = 2.0, 8
+#: Rounds of the method of false position.
+_FALSE_POSITIONS = 60
 
 
 @compiled
@@ -168,7 +170,7 @@ def _assemble(
                 worst = max(worst, abs(local[e, 2 * j + c, 3]) * h)
             # Integrals of P dz and of P du.
             weight = h * gauss[1, j] * w
-            heights = weight * over * math.exp(-math.log(x) - f[DENSITY])
+            heights = h * gauss[2 if e == 0 else 1, j] * w * over * math.exp(-math.log(x) - f[DENSITY])
             log_t = theta + f[GAMMA]
             if beta != 0.0:
                 log_t -= beta * math.log(p)
@@ -564,6 +566,54 @@ def evaluate(breaks: Any, ends: Any, slopes: Any, cardinal: Any, s: Any, out: An
             value *= t * h
             for c in range(2):
                 out[i, c] += value * slopes[e, j, c]
+
+
+@compiled
+def log_argument(
+    breaks: Any, ends: Any, slopes: Any, cardinal: Any, stretch: float, mass: float, p_s: float, beta: float, s: float
+) -> float:
+    """ln x at one place ``s``."""
+    at, value = np.array([s]), np.empty((1, 2))
+    evaluate(breaks, ends, slopes, cardinal, at, value)
+    p = mass * math.expm1(stretch * s) / math.expm1(stretch) + p_s
+    return (1.0 + beta) * math.log(max(p, 1e-300)) - value[0, 0]
+
+
+@compiled
+def crossings(
+    breaks: Any, ends: Any, slopes: Any, cardinal: Any, stretch: float, mass: float, p_s: float, beta: float,
+    samples: Any, kinks: Any, close: float,
+) -> Any:  # fmt: skip
+    """The places at which ln x passes one of the ``kinks``, to ``close``, by false position with the Illinois rule
+    between neighbouring ``samples`` (k,) of which one is above."""
+    count = len(samples)
+    at = np.empty((count, 2))
+    evaluate(breaks, ends, slopes, cardinal, samples, at)
+    level = np.empty(count)
+    for i in range(count):
+        p = mass * math.expm1(stretch * samples[i]) / math.expm1(stretch) + p_s
+        level[i] = (1.0 + beta) * math.log(max(p, 1e-300)) - at[i, 0]
+    found = []
+    for kink in kinks:
+        for i in range(count - 1):
+            a, b = samples[i], samples[i + 1]
+            f_a, f_b = level[i] - kink, level[i + 1] - kink
+            if (f_a >= 0.0) == (f_b >= 0.0):
+                continue
+            side, place = 0, a
+            for _ in range(_FALSE_POSITIONS):
+                before, place = place, (a * f_b - b * f_a) / (f_b - f_a)
+                value = log_argument(breaks, ends, slopes, cardinal, stretch, mass, p_s, beta, place) - kink
+                if value == 0.0 or abs(place - before) < close or b - a < close:
+                    break
+                if (value >= 0.0) == (f_b >= 0.0):
+                    b, f_b, f_a = place, value, 0.5 * f_a if side == 1 else f_a
+                    side = 1
+                else:
+                    a, f_a, f_b = place, value, 0.5 * f_b if side == -1 else f_b
+                    side = -1
+            found.append(place)
+    return np.array(found)
 
 
 @compiled

@@ -29,14 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
 from chuteflow.numerics.tabulate import Array, FunctionTable, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import BASES, BaseCondition, base
-from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
+from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_height, require_positive
 
 #: Order of the functions of x in a table of closures: a, k, loss, work, shear and wall_shear as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
@@ -45,6 +44,9 @@ CONDUCTION, COUPLING, LOSS, WORK, SHEAR, WALL_SHEAR, DENSITY, GAMMA = range(8)
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
 UPPER, _PIECES, _DEGREE = 4.2, 200, 7
+#: Closures differ by less than the second number from one side of a break to the other, at this distance in ln x, where
+#: they have no jump.
+_BESIDE, _JUMP = 1e-9, 1e-7
 
 
 def _coordinate(x: Array) -> Array:
@@ -92,10 +94,11 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
 
-def evaluate_closures(table: FunctionTable, x: Array) -> tuple[Array, Array]:
-    """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
+def evaluate_closures(table: FunctionTable, x: Array, side: Array | None = None) -> tuple[Array, Array]:
+    """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape; at a
+    break those of the ``side`` on which that x lies, where it is given."""
     inner = np.log1p(x * (1.0 / OFFSET))
-    values, slopes = table(np.log1p(inner))
+    values, slopes = table(np.log1p(inner), None if side is None else _coordinate(side))
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
@@ -173,9 +176,9 @@ class Model:
         """ln T, given Gamma."""
         return theta + gamma if self.beta == 0.0 else theta + gamma - self.beta * log_stress(p)
 
-    def closures(self, x: Array) -> tuple[Array, Array]:
+    def closures(self, x: Array, side: Array | None = None) -> tuple[Array, Array]:
         """The eight functions at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
-        return evaluate_closures(self.table, x)
+        return evaluate_closures(self.table, x, side)
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
@@ -199,6 +202,17 @@ class Model:
     def kinks(self) -> Array:
         """ln x at which the closures are not smooth, ascending."""
         return np.log(_argument(np.array(self.table.breaks)))
+
+    def kinks_at(self, which: Sequence[int]) -> Array:
+        """Some of the kinks by their index; not a number where there is none."""
+        there = np.append(self.kinks, np.nan)
+        return there[np.minimum(which, len(self.kinks))]
+
+    @cached_property
+    def kinks_join(self) -> bool:
+        """Whether the closures are continuous there: all but COUPLING are, where g0 has a kink and g4 is not 0."""
+        below, above = (self.closures(np.exp(self.kinks + side))[0][COUPLING] for side in (-_BESIDE, _BESIDE))
+        return bool(np.abs(above - below).max(initial=0.0) < _JUMP)
 
     @cached_property
     def flux_scale(self) -> float:
@@ -247,11 +261,8 @@ def model(chute: Chute) -> Model:
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)
-    if chute.surface == "free" and dilute_drift(chosen, chute.restitution, chute.slope) >= 0.5:
-        raise InputError(
-            f"closure {chosen} at e = {chute.restitution:g}: T grows so fast far above that h is infinite: "
-            "take a larger e, the surface interface or the Fourier form of the closure"
-        )
+    if chute.surface == "free":
+        require_height(chosen, chute.restitution, chute.slope)
     on = base(chute.base)
     return _model(chute, chosen, _parameters(chute), closure_table(chosen, chute.restitution, chute.slope, on), on)
 

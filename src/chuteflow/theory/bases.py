@@ -21,6 +21,7 @@ from chuteflow.numerics.complex_step import stepped
 from chuteflow.parameters import PARAMETERS
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Reduced
+from chuteflow.theory.transport import AtBase, Number, Vector, richman_exchange
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,10 @@ class BaseCondition:
         """The two functions of the density in which F1 and the loss are affine."""
 
     @abstractmethod
+    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+        """These two where the density vanishes, of g0 and A g1/g2 there."""
+
+    @abstractmethod
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1, given the two functions."""
 
@@ -44,6 +49,10 @@ class BaseCondition:
     def loss(self, wall_restitution: float, roughness: float) -> tuple[float, float]:
         """The energy lost in collisions with the base over p sqrt(T): a constant, and the factor of the second
         function."""
+
+    @abstractmethod
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+        """The momentum M that the base takes from moving grains, and the energy lost in collisions with it."""
 
     def checked_roughness(self, value: Any) -> float:
         """The roughness, checked to be in the range of the condition.
@@ -91,6 +100,11 @@ class Richman(BaseCondition):
         """g1/g2 and A g1/g2, with A of (2.12) for grains and hemispheres of one size."""
         return reduced.shear, reduced.wall_shear
 
+    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+        """g1/g2 vanishes."""
+        del radial
+        return 0.0, grip
+
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1 of (3.16): with dbar = (1 + diameter)/2 for the diameter d before the shear rate in (2.10), and in A."""
         plain = boundary.slip_coefficient(first, second, roughness, slope)
@@ -104,6 +118,10 @@ class Richman(BaseCondition):
     def loss(self, wall_restitution: float, roughness: float) -> tuple[float, float]:
         """(2.15), the same at every density."""
         return boundary.base_loss(wall_restitution, roughness), 0.0
+
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+        """(2.9)-(2.15)."""
+        return richman_exchange(at, roughness, wall_restitution, self.diameter)
 
     def checked_roughness(self, value: Any) -> float:
         """From hemispheres that touch, to those between which a grain touches the plane.
@@ -151,6 +169,11 @@ class JohnsonJackson(BaseCondition):
         """G/g0 and g0/G."""
         return reduced.compressibility / reduced.radial, reduced.radial / reduced.compressibility
 
+    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+        """G is 1."""
+        del grip
+        return 1.0 / radial, radial
+
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1; the roughness does not enter."""
         del second, roughness
@@ -160,6 +183,14 @@ class JohnsonJackson(BaseCondition):
         """No constant, and the factor of g0/G."""
         del roughness
         return 0.0, math.pi * math.sqrt(3.0) / (4.0 * self.packing) * (1.0 - wall_restitution**2)
+
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+        """The drag is proportional to the velocity along the wall."""
+        strength = at.density * at.radial * at.root_temperature
+        drag = -(strength * (math.pi * math.sqrt(3.0) / (6.0 * self.packing) * self.specularity))
+        _, loss = self.loss(wall_restitution, roughness)
+        u, v, _ = at.velocity
+        return (drag * u, drag * v, at.normal), strength * at.root_temperature * at.root_temperature * loss
 
 
 #: The bases by name, with the parameters that they have unless others are given.

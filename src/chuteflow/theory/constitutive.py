@@ -27,6 +27,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from chuteflow.checks import shown
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
 
@@ -42,7 +43,7 @@ WALL_CONTACT = np.pi / (12.0 * np.sqrt(2.0))
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Values of a law at given nu, in forms that are finite at nu = 0; arrays of one shape.
+    """Values of a law at given nu, in forms that are finite at nu = 0; arrays of one shape, or single numbers.
 
     ``radial`` is g0; ``compressibility`` is G = g1/nu and ``compressibility_slope`` dG/dnu;
     ``viscosity`` g2; ``conductivity`` g3; ``density_conductivity`` g4;
@@ -106,6 +107,15 @@ class Law:
     valid: str = ""
     spec: str = field(default="", compare=False)
 
+    def __post_init__(self) -> None:
+        try:
+            hash(self)
+        except TypeError as error:
+            raise InputError(
+                f"closure {self.name!r}: {error}: what is remembered of a law is found by its values, so that its "
+                "function must be a plain one or a frozen dataclass, and its breaks a tuple or a function"
+            ) from None
+
     def __str__(self) -> str:
         return self.spec or self.name
 
@@ -165,6 +175,7 @@ class Law:
         object.__setattr__(formula, "breaks", getattr(self.coefficients, "breaks", self.breaks))
         return replace(self, coefficients=formula, densest=formula.densest)
 
+    @lru_cache(maxsize=1024)  # noqa: B019 - laws are few
     def breaks_at(self, e: float, slope: float) -> tuple[float, ...]:
         """The volume fractions, ascending, at which a coefficient is not smooth at this restitution and slope.
 
@@ -172,13 +183,18 @@ class Law:
             InputError: for one that is not between 0 and the densest packing.
         """
         own: Any = getattr(self.coefficients, "breaks", self.breaks)
-        places: Any = own(e, slope) if callable(own) else own
+        try:
+            given: Any = own(e, slope) if callable(own) else own
+            places = sorted(float(nu) for nu in given)
+        except Exception as error:  # noqa: BLE001 - a law of the user may raise anything
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"closure {self}: its breaks fail at e = {e}, slope = {slope}: {said}") from None
         for nu in places:
             if not 0.0 < nu < np.real(self.densest):
                 raise InputError(
                     f"closure {self.name!r} has a break at nu = {nu:g}: must be above 0 and below {self.densest:g}"
                 )
-        return tuple(sorted(places))
+        return tuple(places)
 
     def at(self, x: Field, e: float, slope: float) -> tuple[Field, Field, Coefficients]:
         """nu, 1 - nu/nu* and the coefficients at x = nu/(1 - nu/nu*).
@@ -188,14 +204,36 @@ class Law:
         """
         room = 1.0 / (1.0 + x / self.densest)
         nu = x * room
+        return nu, room, self.called(self.coefficients, nu, room, e, slope)
+
+    def of_density(self, nu: Field, e: float, slope: float, rate: Field | None = None) -> Coefficients:
+        """The coefficients at ``nu``; of a law that ``knows_slope`` where the shear rate over nu sqrt(T) is ``rate``,
+        if one is given.
+
+        Raises:
+            InputError: where the law's function fails, naming it and the densities.
+        """
+        room = 1.0 - nu / self.densest
+        if rate is None or not self.knows_slope:
+            return self.called(self.coefficients, nu, room, e, slope)
+        formula: Any = self.coefficients
+        return self.called(formula.at_shear, nu, room, e, rate)
+
+    def called(self, function: Callable[..., Coefficients], nu: Field, *others: Any) -> Coefficients:
+        """What a ``function`` of the law gives at ``nu`` and the ``others``: room, e, and slope or rate.
+
+        Raises:
+            InputError: where it fails, naming it and the densities.
+        """
         try:
-            found = self.coefficients(nu, room, e, slope)
+            # What is no number is told with its density by those who ask.
+            with np.errstate(all="ignore"):
+                return _spread(function(nu, *others), np.shape(nu))
         except InputError:
             raise
         except Exception as error:  # noqa: BLE001 - a law of the user may raise anything
             said = f"{type(error).__name__}: {error}"
-            raise InputError(f"closure {self}: its function fails at {_where(nu, e)}: {said}") from None
-        return nu, room, found
+            raise InputError(f"closure {self}: its function fails at {_where(nu, others[1])}: {said}") from None
 
 
 @dataclass(frozen=True)
@@ -273,9 +311,22 @@ def require_limit(law: Law, e: float, slope: float, what: str) -> None:
         )
 
 
+def require_height(law: Law, e: float, slope: float) -> None:
+    """Check that the height of the centre of mass is finite on the half-line.
+
+    Raises:
+        InputError: where the temperature grows too fast far above.
+    """
+    if np.any(dilute_drift(law, e, slope) >= 0.5):
+        raise InputError(
+            f"closure {law} at e = {e:g}: T grows so fast far above that h is infinite: "
+            "take a larger e, the surface interface or the Fourier form of the closure"
+        )
+
+
 def fingerprint(law: Law, e: float, slope: float) -> list[float]:
     """Values of ``law`` at a few densities, by which it is known again, whatever its name."""
-    x = np.array([0.0, 0.3, 3.0])
+    x = np.append(0.0, np.geomspace(1e-2, 1e2, _KNOWN_BY))
     _, _, g = law.at(x, e, slope)
     # nu g4 is told by g4.
     values = [getattr(g, name) for name in FUNCTIONS]
@@ -300,6 +351,8 @@ FUNCTIONS = {
     "dissipation": ("g5/nu^2", False),
     "bulk_viscosity": ("g6", False),
 }
+#: Densities by which a law is known again, and at which it is tried.
+_KNOWN_BY = 25
 _TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
 
 
@@ -313,20 +366,30 @@ def require_positive(law: Law, e: float, slope: float) -> None:
 
 
 # Maps ask for thousands of chutes of the same grains.
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _require_positive(law: Law, e: float, slope: float) -> None:
+    if not (isinstance(law.densest, (int, float)) and 0.0 < law.densest <= 1.0):
+        raise InputError(
+            f"closure {law}: its densest packing is {shown(law.densest)}: must be a number above 0, at most 1"
+        )
     nu, _, g = law.at(_TRIED, e, slope)
     if not isinstance(g, Coefficients):
         raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")
-    for name, (symbol, positive) in FUNCTIONS.items():
-        try:
-            values = np.broadcast_to(np.asarray(getattr(g, name), dtype=float), nu.shape)
-        except (TypeError, ValueError):
-            shape = np.shape(getattr(g, name))
+    functions = FUNCTIONS if g.density_flux is None else FUNCTIONS | {"density_flux": ("nu g4", False)}
+    for name, (symbol, positive) in functions.items():
+        values = getattr(g, name)
+        if not isinstance(values, (np.ndarray, float, int)) or np.asarray(values).dtype.kind not in "fi":
+            kind = values.dtype if isinstance(values, np.ndarray) else type(values).__name__
             raise InputError(
-                f"closure {law}: {symbol} ({name}) has the shape {shape} for nu of the shape {nu.shape}: "
-                "must be the same"
-            ) from None
+                f"closure {law}: {symbol} ({name}) is of the type {kind} at {_where(nu, e)}: must be an array of real "
+                "numbers"
+            )
+        if np.shape(values) not in ((), nu.shape):
+            raise InputError(
+                f"closure {law}: {symbol} ({name}) has the shape {np.shape(values)} for nu of the shape {nu.shape} at "
+                f"{_where(nu, e)}: must be the same"
+            )
+        values = np.broadcast_to(values, nu.shape)
         bad = ~np.isfinite(values) | ((values <= 0.0) if positive else (name == "dissipation") & (values < 0.0))
         # A flux along the density gradient may grow like 1/nu where dilute.
         bad[0] &= name != "density_conductivity"
@@ -338,6 +401,14 @@ def _require_positive(law: Law, e: float, slope: float) -> None:
                 "take a larger e or another closure"
             )
     law.breaks_at(e, slope)
+
+
+def _spread(found: Coefficients, shape: tuple[int, ...]) -> Coefficients:
+    """Coefficients of which some may be single numbers, which hold at every density, as arrays."""
+    if not shape or not isinstance(found, Coefficients):
+        return found
+    single = {name: value for name, value in vars(found).items() if isinstance(value, (float, int))}
+    return replace(found, **{name: np.full(shape, value) for name, value in single.items()}) if single else found
 
 
 def _where(nu: Field, e: float) -> str:

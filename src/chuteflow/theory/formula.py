@@ -10,6 +10,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
 from chuteflow.theory.constitutive import CLUSTERED, Coefficients, Field
@@ -95,15 +97,14 @@ class Formula:
 def crossings(values: Field, places: Field, between) -> list[float]:
     """Zeros of a function between neighbouring ``places`` at which its ``values`` differ in sign, by bisection."""
     found = []
-    for i in range(len(places) - 1):
+    above = values >= 0.0
+    for i in np.flatnonzero(above[1:] != above[:-1]).tolist():
         low, high = float(places[i]), float(places[i + 1])
-        if (values[i] >= 0.0) == (values[i + 1] >= 0.0):
-            continue
         while True:
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            if (between(middle) >= 0.0) == (values[i] >= 0.0):
+            if (between(middle) >= 0.0) == above[i]:
                 low = middle
             else:
                 high = middle

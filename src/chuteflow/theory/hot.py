@@ -31,8 +31,8 @@ from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.roots import bisect
-from chuteflow.theory import boundary
-from chuteflow.theory.constitutive import Field, Law, reduce
+from chuteflow.theory.bases import BASES, BaseCondition
+from chuteflow.theory.constitutive import Field, Law, reduce, require_limit
 
 #: lambda from which on there is no hot flow; 2.284 in section 4.3.
 LAMBDA_C = 3.0
@@ -48,7 +48,7 @@ class Dilute:
     """The limits of a law at nu = 0, (4.1) and table 2, and of Richman's A(nu).
 
     ``g20`` viscosity, ``g30`` conductivity, ``g40`` density conductivity, ``g52`` dissipation over nu^2,
-    ``A0`` the limit of nu A(nu) (4.4). The normal stress is that of an ideal gas, nu T.
+    ``A0`` the limit of nu A(nu) (4.4), ``g00`` radial distribution. The normal stress is that of an ideal gas, nu T.
     """
 
     g20: float
@@ -56,14 +56,17 @@ class Dilute:
     g40: float
     g52: float
     A0: float
+    g00: float = 1.0
 
 
 def dilute(law: Law, e: float, slope: float) -> Dilute:
     """The dilute limit of ``law``.
 
     Raises:
-        InputError: where the law has none, that is no finite and positive conductivity and viscosity.
+        InputError: where the law has none, that is no finite and positive conductivity and viscosity, or a temperature
+            that grows without bound far above.
     """
+    require_limit(law, e, slope, "the closed form of hot flows needs")
     _, _, limit = law.at(np.zeros(1), e, slope)
     g20, g30, g40, g52 = (
         float(value[0])
@@ -72,7 +75,7 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
     wall_shear = reduce(law, np.zeros(1), e, slope).wall_shear
-    return Dilute(g20, g30, g40, g52, float(wall_shear[0]) * g20)
+    return Dilute(g20, g30, g40, g52, float(wall_shear[0]) * g20, float(limit.radial[0]))
 
 
 @dataclass(frozen=True)
@@ -136,28 +139,35 @@ _IMBALANCE = {
 }
 
 
-def hot_parameters(limit: Dilute, wall_restitution: float, roughness: float, slope: float) -> HotParameters:
-    """F10, F21 and delta, and what follows from them, for a chute of ``slope`` = tan(theta).
+def hot_parameters(
+    limit: Dilute, wall_restitution: float, roughness: float, slope: float, on: BaseCondition = BASES["richman"]
+) -> HotParameters:
+    """F10, F21 and delta, and what follows from them, for a chute of ``slope`` = tan(theta) with the base ``on``.
 
     Raises:
         InputError: where grains would slip up the slope, which no law in its range does.
     """
-    F10 = _slip(limit, roughness, slope)
+    F10 = _slip(limit, roughness, slope, on)
     return HotParameters(
         slope=slope,
         dilute=limit,
         F10=F10,
-        F21=slope * F10 - boundary.base_loss(wall_restitution, roughness),
+        F21=slope * F10 - _loss(limit, wall_restitution, roughness, on),
         delta=limit.g52 - slope**2 / limit.g20,
     )
 
 
-def _slip(limit: Dilute, roughness: float, slope: float) -> float:
-    no_shear, wall_shear = np.zeros(1), np.full(1, limit.A0 / limit.g20)
-    F10 = float(boundary.slip_coefficient(no_shear, wall_shear, roughness, slope)[0])
+def _slip(limit: Dilute, roughness: float, slope: float, on: BaseCondition) -> float:
+    first, second = on.where_empty(limit.g00, limit.A0 / limit.g20)
+    F10 = float(on.slip(np.array(first), np.array(second), roughness, slope))
     if F10 <= 0.0:
         raise InputError(f"slip velocity F10 = {F10}: must be positive, as it is for a larger viscosity g20")
     return F10
+
+
+def _loss(limit: Dilute, wall_restitution: float, roughness: float, on: BaseCondition) -> float:
+    loss, by_second = on.loss(wall_restitution, roughness)
+    return loss + by_second * on.where_empty(limit.g00, limit.A0 / limit.g20)[1]
 
 
 # The slopes that carry hot flows
@@ -176,25 +186,29 @@ class HotEnergyBudget:
     M: float
 
 
-def budget(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> HotEnergyBudget:
+def budget(
+    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: BaseCondition = BASES["richman"]
+) -> HotEnergyBudget:
     """The energy budget (4.25), (4.26) for one value of lambda, of either sign."""
     root = math.sqrt(math.pi / 2.0)
     inside = math.pi * lambda_ * limit.g30 / 3.0
     return HotEnergyBudget(
-        l=root * boundary.base_loss(wall_restitution, roughness),
-        m=root * _slip(limit, roughness, 1.0),
+        l=root * _loss(limit, wall_restitution, roughness, on),
+        m=root * _slip(limit, roughness, 1.0, on),
         L=inside * limit.g52,
         M=inside / limit.g20,
     )
 
 
-def slope_at(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> float | None:
+def slope_at(
+    limit: Dilute, wall_restitution: float, roughness: float, lambda_: float, on: BaseCondition = BASES["richman"]
+) -> float | None:
     """tan(theta) at which hot flows, or their bound, have this lambda: (4.27) with lambda for lambda_c.
 
     The slope has F21 of the sign of lambda, as a flow needs; lambda = 0 is the slope with F21 = 0. None where
     there is no such slope.
     """
-    b = budget(limit, wall_restitution, roughness, lambda_)
+    b = budget(limit, wall_restitution, roughness, lambda_, on)
     gap = b.m * b.L - b.l * b.M
     if lambda_ != 0.0 and gap <= 0.0:
         return None
@@ -214,18 +228,22 @@ class SlopeBounds:
 
 
 def slope_bounds(
-    limit: Dilute, wall_restitution: float, roughness: float, lambda_c: float = LAMBDA_C
+    limit: Dilute,
+    wall_restitution: float,
+    roughness: float,
+    lambda_c: float = LAMBDA_C,
+    on: BaseCondition = BASES["richman"],
 ) -> SlopeBounds | None:
     """The slopes with hot flows, exactly (4.25)-(4.27), or None where there are none.
 
     There is one interval at most. Where l/m < L/M it is dissipative, from F21 = 0 to lambda = ``lambda_c``
     (2.284 gives the curve of figure 14); where l/m > L/M it is productive, from delta = 0 to F21 = 0.
     """
-    b = budget(limit, wall_restitution, roughness, lambda_c)
+    b = budget(limit, wall_restitution, roughness, lambda_c, on)
     interior_zero = math.sqrt(limit.g20 * limit.g52)  # tan(theta) where delta = 0
     base_zero = math.sqrt(b.l / b.m)
     if base_zero < interior_zero:
-        highest = slope_at(limit, wall_restitution, roughness, lambda_c)
+        highest = slope_at(limit, wall_restitution, roughness, lambda_c, on)
         return SlopeBounds(base_zero, highest, "dissipative") if highest else None
     return SlopeBounds(interior_zero, base_zero, "productive") if interior_zero < base_zero else None
 

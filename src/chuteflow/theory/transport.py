@@ -1,4 +1,4 @@
-"""The equations of motion in full, (2.1)-(2.7), and Richman's base in full, (2.9)-(2.15).
+"""The equations of motion in full, (2.1)-(2.7), and the conditions at a base, Richman's (2.9)-(2.15) in full.
 
 # notation: nu volume fraction, T granular temperature, u = (u, v, w), P pressure tensor, q heat flux,
 # n = (0, 0, 1) the normal of the base into the flow, tau = (1, 0, 0), t = (0, 1, 0).
@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -78,6 +78,32 @@ class Motion:
     forces: tuple[Number, ...]
     inertia: tuple[Number, ...]
 
+    @property
+    def contact(self) -> AtBase:
+        """What a base meets of it."""
+        return AtBase(self.density, self.radial, self.velocity, self.root_temperature, self.shear, self.pressure[2][2])
+
+
+@dataclass(frozen=True)
+class AtBase:
+    """What a base meets: density and g0 of the grains, their velocity and sqrt(T), the gradient ``shear`` of the
+    velocity, and the ``normal`` stress P_zz."""
+
+    density: Number
+    radial: Number
+    velocity: Vector
+    root_temperature: Number
+    shear: Tensor
+    normal: Number
+
+
+class Floor(Protocol):
+    """A base, as moving grains meet it."""
+
+    def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
+        """The momentum M that it takes from the grains, and the energy D that is lost in collisions with it."""
+        ...
+
 
 def motion(fields: Fields, gradient: Gradient, grains: Material) -> Motion:
     """Everything in (2.1)-(2.7) for ``fields``."""
@@ -116,11 +142,10 @@ def closures(grains: Material, nu: Number, rate: Callable[[], Number]) -> list[N
 
     ``rate`` gives the shear rate over nu sqrt(T); it is requested where the dissipation of the law depends on it.
     """
-    law, e = grains.law, grains.restitution
+    law, e, slope = grains.law, grains.restitution, grains.slope
     if law.knows_slope:
-        at_shear: Any = law.coefficients.at_shear  # pyright: ignore[reportFunctionMemberAccess]
-        return apply_two(lambda nu, rate: _table(nu, at_shear(nu, 1.0 - nu / law.densest, e, rate)), nu, rate())
-    return apply(lambda nu: _table(nu, law.coefficients(nu, 1.0 - nu / law.densest, e, grains.slope)), nu)
+        return apply_two(lambda nu, rate: _table(nu, law.of_density(nu, e, slope, rate)), nu, rate())
+    return apply(lambda nu: _table(nu, law.of_density(nu, e, slope)), nu)
 
 
 def _table(nu: Field, g: Coefficients) -> Field:
@@ -165,19 +190,16 @@ def divergence(vector: Vector, gradient: Gradient) -> Number:
     return _sum(gradient(vector[i])[i] for i in AXES)
 
 
-def base_conditions(at: Motion, roughness: float, wall_restitution: float) -> tuple[Number, Number, Number, Number]:
+def base_conditions(
+    at: Motion, on: Floor, roughness: float, wall_restitution: float
+) -> tuple[Number, Number, Number, Number]:
     """What vanishes at the base: P_xz - M_x, P_yz - M_y, w, and q_z - M . u_s + D, all of ``at``.
 
-    Momentum (2.9) along x and y; no flow through the base; energy (2.14). M_z = P_zz fixes nu chi T, the
-    exclusion factor of (2.10), and there is no condition on nu, which does not flow through the base.
+    Momentum (2.9) along x and y; no flow through the base; energy (2.14). There is no condition on nu, which does not
+    flow through the base.
     """
-    root_T = at.root_temperature
     slip = _vector(lambda i: -at.velocity[i])
-    # M_i = nu chi T m_i
-    m = traction(slip, root_T, at.shear, _bumps(at), roughness)
-    strength = at.pressure[2][2] / m[2]
-    M = _vector(lambda i: strength * m[i])
-    loss = strength * root_T * boundary.base_loss(wall_restitution, roughness)
+    M, loss = on.exchange(at.contact, roughness, wall_restitution)
     return (
         at.pressure[0][2] - M[0],
         at.pressure[1][2] - M[1],
@@ -186,8 +208,22 @@ def base_conditions(at: Motion, roughness: float, wall_restitution: float) -> tu
     )
 
 
-def traction(slip: Vector, root_T: Number, grad_u: Tensor, A: Number, roughness: float) -> Vector:
-    """M_i/(nu chi T) of (2.10), with the tensors (2.13)."""
+def richman_exchange(at: AtBase, roughness: float, wall_restitution: float, diameter: float) -> tuple[Vector, Number]:
+    """M (2.9) and D (2.15) of hemispheres of a ``diameter``; M_z = P_zz fixes nu chi T, with the exclusion factor chi
+    of (2.10)."""
+    root_T, mean = at.root_temperature, 0.5 * (1.0 + diameter)
+    bumps = 1.0 + (WALL_CONTACT / mean) * (1.0 + 0.625 / (at.density * at.radial))  # A(nu) of (2.12)
+    # M_i = nu chi T m_i
+    m = traction(_vector(lambda i: -at.velocity[i]), root_T, at.shear, bumps, roughness, mean)
+    strength = at.normal / m[2]
+    loss = strength * root_T * boundary.base_loss(wall_restitution, roughness)
+    return _vector(lambda i: strength * m[i]), loss
+
+
+def traction(
+    slip: Vector, root_T: Number, grad_u: Tensor, A: Number, roughness: float, mean_diameter: float = 1.0
+) -> Vector:
+    """M_i/(nu chi T) of (2.10), with the tensors (2.13) and dbar = ``mean_diameter`` of grains and hemispheres."""
     k = boundary.kappa(roughness)
     c = math.sqrt(2.0 / math.pi) / root_T
     second, third = richman_tensors(roughness)
@@ -199,7 +235,7 @@ def traction(slip: Vector, root_T: Number, grad_u: Tensor, A: Number, roughness:
             for k_ in AXES
             if third[i][j][k_] != 0.0 or _UNIT[2][j] * second[i][k_] != 0.0
         )
-        return _UNIT[2][i] + c * (k * slip[i] + bumps)
+        return _UNIT[2][i] + c * (k * slip[i] + mean_diameter * bumps)
 
     return _vector(component)
 
@@ -213,11 +249,6 @@ def richman_tensors(roughness: float) -> tuple[Field, Field]:
     turns = np.einsum("i,jk->ijk", n, plane) + np.einsum("j,ki->ijk", n, plane) + np.einsum("k,ij->ijk", n, plane)
     third = (roughness**2 - 2.0) * np.einsum("i,j,k->ijk", n, n, n) - 0.5 * roughness**2 * turns
     return second, third
-
-
-def _bumps(at: Motion) -> Number:
-    """A(nu) of (2.12), d = d_w."""
-    return 1.0 + WALL_CONTACT * (1.0 + 0.625 / (at.density * at.radial))
 
 
 def _vector(entry: Callable[[int], Any]) -> Any:

@@ -236,7 +236,7 @@ class MappedSystem:
         mass, y2 = x * x, y * y
         nu = mass * per_scale
         nu = np.where(np.real(nu) < chosen.densest, nu, np.nan)
-        g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, s)
+        g = chosen.of_density(nu, chute.restitution, s)
         big_g, work = g.compressibility, g.compressibility / g.viscosity
         nu_contact = nu * (1.0 + WALL_CONTACT) + WALL_CONTACT * 5.0 / (8.0 * g.radial)  # nu A, (2.12)
         slip = boundary.slip_coefficient(nu * work, nu_contact * work, chute.roughness, s)
