@@ -1,4 +1,4 @@
-"""What LAMMPS has written: layers.txt, totals.txt and contacts.dump, also of runs that were cut off and resumed.
+"""What LAMMPS has written: layers.txt, totals.txt, waves.txt and contacts.dump, also of runs that were cut off and resumed.
 
 A run that goes on from a restart file repeats what came after it: of two records of one step the later counts. What is
 incomplete at the end of a file is left out.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.dem.script import MOMENTS, SUMS
+from chuteflow.dem.script import MOMENTS, SUMS, WAVE_PARTS
 from chuteflow.errors import InputError
 
 #: An array of numbers, whole numbers or truth values.
@@ -84,13 +84,26 @@ def read_totals(path: Path) -> tuple[Array, Array]:
     Raises:
         InputError: for a file that is missing or none of these.
     """
+    return _series(path, len(SUMS))
+
+
+def read_waves(path: Path) -> tuple[Array, Array]:
+    """Steps (n,) and means (n, 8) of waves.txt in order, see :data:`chuteflow.dem.script.WAVE_PARTS`.
+
+    Raises:
+        InputError: for a file that is missing or none of these.
+    """
+    return _series(path, len(WAVE_PARTS))
+
+
+def _series(path: Path, columns: int) -> tuple[Array, Array]:
     found: dict[int, list[float]] = {}
     for line in _lines(path):
         words = line.split()
-        if len(words) == 1 + len(SUMS) and not line.startswith("#"):
+        if len(words) == 1 + columns and not line.startswith("#"):
             found[int(words[0])] = [float(word) for word in words[1:]]
     steps = sorted(found)
-    return np.array(steps), np.array([found[step] for step in steps]).reshape(-1, len(SUMS))
+    return np.array(steps), np.array([found[step] for step in steps]).reshape(-1, columns)
 
 
 def read_frames(path: Path, after: int) -> Iterator[Frame]:

@@ -177,13 +177,13 @@ def _states(folder: Path) -> list[Path]:
 
 
 def _from_start(run: Run) -> list[str]:
-    for name in (script.LAYERS, script.TOTALS, script.CONTACTS):
+    for name in script.WRITTEN:
         (run.folder / name).unlink(missing_ok=True)
     return ["-in", script.START]
 
 
 def _resumed(run: Run, state: Path) -> list[str]:
-    trim(run.folder, (script.LAYERS, script.TOTALS, script.CONTACTS))
+    trim(run.folder, script.WRITTEN)
     return ["-in", script.RESUME, "-var", "from", state.name]
 
 
