@@ -1,4 +1,4 @@
-"""What LAMMPS has written: layers.txt, totals.txt, waves.txt and contacts.dump, also of runs that were cut off and resumed.
+"""What LAMMPS has written: layers.txt, totals.txt, waves.txt and contacts.dump, also of resumed runs.
 
 A run that goes on from a restart file repeats what came after it: of two records of one step the later counts. What is
 incomplete at the end of a file is left out.

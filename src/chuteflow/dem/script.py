@@ -1,7 +1,8 @@
 """The input of LAMMPS for a scene: files that run with any LAMMPS that has the package GRANULAR, here or elsewhere.
 
 A folder holds grains.data (all positions), settings.in (everything but where the grains come from), start.in and
-resume.in. LAMMPS writes layers.txt, totals.txt, waves.txt, contacts.dump and the restart files state.a and state.b into it.
+resume.in. LAMMPS writes layers.txt, totals.txt, waves.txt, contacts.dump and the restart files state.a and state.b
+into it.
 """
 
 from __future__ import annotations

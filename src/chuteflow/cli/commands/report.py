@@ -10,7 +10,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.figures import METHOD_HELP, Numbers, directory
+from chuteflow.cli.commands.figures import METHOD_HELP, Numbers
 from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
 from chuteflow.processes import available_cores
 
@@ -31,7 +31,7 @@ _NAME = "index.html"
 @options.quiet_option
 def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool, quiet: bool) -> None:
     """Compute all, and write the page at the end, whole or not at all."""
-    path = directory(out or ".") / _NAME
+    path = options.directory(out or ".") / _NAME
     from chuteflow.io.writing import require_writable, write_whole
 
     require_writable(path, (".html",))
