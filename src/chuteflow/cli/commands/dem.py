@@ -151,6 +151,42 @@ def study_command(**given: Any) -> None:
     click.echo(f"{len(every)} runs are in {data}")
 
 
+@command.command("waves")
+@click.argument("source", metavar="FOLDER|FILE")
+@options.option("--direction", metavar="NAME", help="across the slope (the default), or along it.")
+@options.option("--from", "begin", type=options.Number(), help="Time from which on the wave is fitted.")
+@options.option("--to", "end", type=options.Number(), help="Time up to which it is fitted.")
+@options.option("--save", metavar="FILE", help="Write the amplitudes to FILE: .csv.")
+def waves_command(source: str, **given: Any) -> None:
+    """How the longest wave that fits into the box grows, in a run in FOLDER or a FILE of --save."""
+    import math
+
+    from chuteflow.dem import waves
+    from chuteflow.dem.run import read_record
+    from chuteflow.io.tables import number
+    from chuteflow.io.writing import require_writable, write_whole
+
+    if given["save"] is not None:
+        require_writable(given["save"], (".csv",))
+    if os.path.isdir(source):
+        found = waves.amplitudes(read_record(source), given["direction"] or "across")
+    elif given["direction"] is not None:
+        raise InputError("--direction is for a folder: a file has one wave")
+    else:
+        found = waves.read_amplitudes(source)
+    begin, end = given["begin"], given["end"]
+    fitted = found.within(-math.inf if begin is None else begin, math.inf if end is None else end)
+    grown = waves.growth(fitted)
+    click.echo(
+        f"a wave of length {number(2.0 * math.pi / found.wavenumber)}, k = {number(found.wavenumber)}, from t = "
+        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)}, frequency "
+        f"{number(grown.frequency)}; that explains {100.0 * grown.share:.3g} % of its mean square"
+    )
+    if given["save"] is not None:
+        write_whole(given["save"], waves.written(found))
+        click.echo(f"written: {given['save']}")
+
+
 @command.command("results")
 @click.argument("folder", metavar="FOLDER")
 @click.option("--with", "closures", metavar="NAME", multiple=True, help="Closures to compare with, the first in full.")
