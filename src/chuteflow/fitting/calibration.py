@@ -298,14 +298,13 @@ def fit(
         rise = _rise(confidence, objective.count - objective.unknowns, scale, measured.errors_known)
         try:
             intervals = _intervals(objective, best, covariance, rise, measured.errors_known)
-            better = _on_other_flows(objective, best, rise)
+            better = _on_other_flows(objective, best)
             if better is None:
                 break
             raise BetterFit(better)
         except BetterFit as found:
             others.append(best)
-            best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST, tolerance=_CLOSELY)
-            best = best or found.found
+            best = _ended(objective, found.found)
     else:
         raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
@@ -328,26 +327,37 @@ def _require_enough(objective: Objective) -> None:
 
 def _searched(objective: Objective, first: list[Array], trials: int | None) -> tuple[Minimum, list[Minimum]]:
     """The best fit, and the other minima that starts led to."""
-    found = []
-    for start in candidates(objective, first, trials):
-        one = objective.minimise(objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY)
-        if one is not None:
-            found.append(one)
-    if not found:
-        raise SolveError("no trial flow could be followed to a fit: give ranges nearer to the answer")
-    found.sort(key=lambda one: one.chi2)
     kept: list[Minimum] = []
-    for one in found:
-        hopeless = kept and one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
+    left = []
+    for start in candidates(objective, first, trials):
+        # Most starts are on their way to one minimum: it is looked for from the most promising of them.
+        one = objective.minimise(
+            objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY, known=kept
+        )
+        if one is not None and not kept:
+            kept.append(_ended(objective, one))
+        elif one is not None:
+            left.append(one)
+    if not kept:
+        raise SolveError("no trial flow could be followed to a fit: give ranges nearer to the answer")
+    closely = kept[0]
+    for one in sorted(left, key=lambda one: one.chi2):
+        hopeless = one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
         if hopeless or any(_near(objective, one, other) or objective.leads_to(one, other) for other in kept):
             continue
-        kept.append(objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one)
-        kept.sort(key=lambda one: one.chi2)
+        ended = objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY, known=kept)
+        if ended is not None:
+            kept.append(ended)
+            kept.sort(key=lambda one: one.chi2)
     beyond = _beyond_fold(objective, kept[0])
     if beyond is not None:
         kept = sorted([beyond, *kept], key=lambda one: one.chi2)
-    best = objective.minimise(kept[0].x.copy(), kept[0].places, most=_LAST, tolerance=_CLOSELY) or kept[0]
-    return best, kept[1:]
+    return closely if kept[0] is closely else _ended(objective, kept[0]), kept[1:]
+
+
+def _ended(objective: Objective, one: Minimum) -> Minimum:
+    """The minimum that a fit leads to, closely."""
+    return objective.minimise(one.x.copy(), one.places, most=_LAST, tolerance=_CLOSELY) or one
 
 
 def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objective, Minimum] | None:
@@ -433,9 +443,8 @@ def _same_flows(one: Minimum, other: Minimum) -> bool:
     )
 
 
-def _on_other_flows(objective: Objective, best: Minimum, rise: float) -> Minimum | None:
+def _on_other_flows(objective: Objective, best: Minimum) -> Minimum | None:
     """A better fit that starts from other flows at the same parameters, where there are several experiments."""
-    del rise
     if len(objective.cases) == 1:
         return None
     values = best.x[: objective.parameters]

@@ -130,7 +130,7 @@ def _invert(density: Table, x: Array) -> Array:
     (log_ratio, _), _ = density(_coordinate(knots))
     log_scaled = np.interp(log_x, np.log(knots) + log_ratio.real, np.log(knots))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
-    for _ in range(4):
+    for _ in range(3):
         scaled = np.exp(log_scaled)
         values, slopes = density(_coordinate(scaled))
         log_scaled = log_scaled - (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * _coordinate_slope(scaled))

@@ -21,6 +21,7 @@ import hashlib
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -302,6 +303,8 @@ FUNCTIONS = {
 _TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
 
 
+# Keyed by the law itself, as its tables are.
+@lru_cache(maxsize=256)
 def require_positive(law: Law, e: float, slope: float) -> None:
     """Check that a law gives numbers at every density, and that pressure, viscosity and conductivity are positive.
 
