@@ -71,9 +71,9 @@ def cases() -> Iterator[Case]:
 
 def _ordered() -> Iterator[Case]:
     yield from _waves()
-    yield from _variations()
     yield _hot(0, 1)
     yield from _paper()
+    yield from _variations()
     yield from (_hot(number, 1) for number in range(11))
     yield from (_hot(number, 1, base="random") for number in (0, 2))
     yield from (_hot(number, seed) for seed in SEEDS for number in LASTING)

@@ -20,7 +20,7 @@ from chuteflow.fitting.intervals import BetterFit, Interval, interval
 from chuteflow.fitting.measurements import Measurements, Series
 from chuteflow.fitting.objective import LOSSES, Minimum, Objective
 from chuteflow.fitting.residuals import Case, Place
-from chuteflow.fitting.starts import at, candidates
+from chuteflow.fitting.starts import MANY_TRIALS, Candidate, at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
@@ -41,6 +41,8 @@ _HOPELESS = 30.0
 CONFIDENCE = 0.95
 #: Trial chutes at most.
 _MOST_TRIALS = 100_000
+#: Passes over the parameters in which what fits for one widens the interval of another.
+_PASSES = 3
 #: Rounds in which intervals come upon a better fit.
 _ROUNDS = 4
 #: Parameters of two fits that differ by less, in their errors, are the same; flows by less in ln Q, h, M and T.
@@ -326,10 +328,20 @@ def _require_enough(objective: Objective) -> None:
 
 
 def _searched(objective: Objective, first: list[Array], trials: int | None) -> tuple[Minimum, list[Minimum]]:
-    """The best fit, and the other minima that starts led to."""
+    """The best fit, and the other minima that starts led to: from more trial chutes where those that are tried first
+    lead to nothing that resembles the measurements."""
+    best, others = _searched_from(objective, candidates(objective, first, trials))
+    if trials is None and best.chi2 > _HOPELESS * objective.count:
+        again, more = _searched_from(objective, candidates(objective, first, MANY_TRIALS))
+        if again.chi2 < best.chi2:
+            return again, more
+    return best, others
+
+
+def _searched_from(objective: Objective, starts: Sequence[Candidate]) -> tuple[Minimum, list[Minimum]]:
     kept: list[Minimum] = []
     left = []
-    for start in candidates(objective, first, trials):
+    for start in starts:
         # Most starts are on their way to one minimum: it is looked for from the most promising of them.
         one = objective.minimise(
             objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY, known=kept
@@ -405,28 +417,36 @@ def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
 def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: float, known: bool) -> list[Interval]:
     """The intervals of all parameters.
 
-    Where a fold of a number that is known exactly is near, that number is relaxed; so it is where no flow goes on.
+    Where a fold of a number that is known exactly is near, that number is relaxed; so it is where no flow goes on. What
+    fits for one parameter at some distance is in the intervals of the others too.
     """
     near = _at_fold(objective, best)
     around = _relaxed(objective, best, _TIGHT) if near else None
     if around is not None and around[1].chi2 > best.chi2 + rise:
         near, around = False, None
-    found = []
-    for j in range(objective.parameters):
-        one = None
-        if near and around is not None:
-            with suppress(BetterFit):
-                one = interval(*around, _spread(*around, known)[1], j, rise)
-        if one is None or "no flow" in one.ends:
-            exact = interval(objective, best, covariance, j, rise)
-            one = exact if one is None else one.continued(exact)
-        if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
-            around = around or _relaxed(objective, best, _TIGHT)
-            if around is not None:
+    exactly: list[Minimum] = []
+    relaxedly: list[Minimum] = []
+    found: list[Interval | None] = [None] * objective.parameters
+    for _ in range(_PASSES):
+        for j, now in enumerate(found):
+            again = now is not None
+            if now is not None and not any(now.leaves_out(float(one.x[j])) for one in (*exactly, *relaxedly)):
+                continue
+            one = None
+            if near and around is not None:
                 with suppress(BetterFit):
-                    one = one.continued(interval(*around, _spread(*around, known)[1], j, rise))
-        found.append(one)
-    return found
+                    one = interval(*around, _spread(*around, known)[1], j, rise, relaxedly, onward=again)
+            if one is None or "no flow" in one.ends:
+                exact = interval(objective, best, covariance, j, rise, exactly, onward=again)
+                one = exact if one is None else one.continued(exact)
+            if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
+                around = around or _relaxed(objective, best, _TIGHT)
+                if around is not None:
+                    with suppress(BetterFit):
+                        relaxed = interval(*around, _spread(*around, known)[1], j, rise, relaxedly, onward=again)
+                        one = one.continued(relaxed)
+            found[j] = one
+    return [one for one in found if one is not None]
 
 
 def _near(objective: Objective, one: Minimum, other: Minimum) -> bool:
