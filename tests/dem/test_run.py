@@ -244,6 +244,14 @@ def test_of_two_blocks_of_one_step_the_later_counts(tmp_path):
     assert layers.count[:, 0].tolist() == [1, 5, 6]
 
 
+def test_blocks_that_reach_up_further_are_cut_to_the_others(tmp_path):
+    path = tmp_path / script.LAYERS
+    path.write_text(layers_text([(10, 2)], bins=3) + layers_text([(20, 4)], bins=5).replace(" 4 1 2 3 4", " 4 7 2 3 4"))
+    layers = output.read_layers(path)
+    assert layers.count.tolist() == [[2, 2, 2], [4, 4, 12]]
+    assert layers.moments[:, :, 0].tolist() == [[1, 1, 1], [7, 7, 7]]
+
+
 @pytest.mark.parametrize("cut", [1, 20, 60, 100])
 def test_a_block_that_was_cut_off_is_left_out_and_trimmed(tmp_path, cut):
     whole = layers_text([(10, 1), (20, 2)])

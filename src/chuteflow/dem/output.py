@@ -72,10 +72,21 @@ def read_layers(path: Path) -> Layers:
     if not blocks:
         raise InputError(f"{path}: it holds no block yet; the run has to go on for longer")
     steps = sorted(blocks)
-    if len({len(block) for block in blocks.values()}) > 1:
-        raise InputError(f"{path}: its blocks have different numbers of layers: they are of different runs")
-    whole = np.array([blocks[step] for step in steps])
+    # The layers of a run that was made longer may reach up further than before.
+    fewest = min(len(block) for block in blocks.values())
+    whole = np.array([_with_layers(blocks[step], fewest) for step in steps])
     return Layers(np.array(steps), whole[:, :, 2], whole[:, :, 3:])
+
+
+def _with_layers(block: Array, count: int) -> Array:
+    """A block (k, columns) with the grains of layer ``count`` and of all above it in one, as the highest layer has."""
+    above = block[count - 1 :]
+    grains = above[:, 2].sum()
+    block = block[:count].copy()
+    if grains > 0.0:
+        block[-1, 2] = grains
+        block[-1, 3:] = above[:, 2] @ above[:, 3:] / grains
+    return block
 
 
 def read_totals(path: Path) -> tuple[Array, Array]:
