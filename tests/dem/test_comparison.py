@@ -263,6 +263,22 @@ def test_compare_prints_tables_words_and_json(itself, tmp_path, capsys):
     assert "no flow: roughness r = 0.4" in capsys.readouterr().out
 
 
+def test_compare_finds_the_parameters_of_a_flow_of_the_theory(itself, tmp_path, capsys):
+    path = str(tmp_path / "run.csv")
+    records.save(itself, path)
+    assert main(["compare", path, "--with", "lun", "--fit", "e"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("lun") and " e " in line)
+    assert float(row.split()[2]) == pytest.approx(itself.restitution, abs=2e-3)
+    assert main(["compare", path, "--with", "lun", "--fit", "e", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    (one,) = answer["fits"]
+    assert one["estimates"]["e"]["value"] == pytest.approx(itself.restitution, abs=2e-3)
+    assert answer["failed"] == []
+    for names, said in (("mu", "unknown parameter 'mu'"), (",", "which parameters are to be found")):
+        assert main(["compare", path, "--fit", names]) == 2
+        assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
