@@ -141,7 +141,7 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
     """
     scene, steps = run.scene, run.steps
     layers = read_layers(run.folder / script.LAYERS)
-    kept = layers.steps > steps.first
+    kept = (layers.steps > steps.first) & (layers.steps <= steps.last)
     count = int(np.count_nonzero(kept))
     if count < 4:
         raise InputError(
@@ -187,7 +187,7 @@ def _part(values: Mapping[str, Array], kind: str) -> dict[str, Array]:
 def _drifts(run: Run) -> tuple[dict[str, Drift], float]:
     """Drifts by the names of their numbers, and the longest time for which one of these remembers its value."""
     steps, totals = read_totals(run.folder / script.TOTALS)
-    kept = steps > run.steps.first
+    kept = (steps > run.steps.first) & (steps <= run.steps.last)
     times, totals = steps[kept] * run.steps.step, totals[kept]
     # Fluctuations across the slope and upward have no mean to be taken off.
     series = (totals[:, 0], totals[:, 1], 0.5 * (totals[:, 2] + totals[:, 3]))
