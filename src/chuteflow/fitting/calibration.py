@@ -330,12 +330,13 @@ def _require_enough(objective: Objective) -> None:
 def _searched(objective: Objective, first: list[Array], trials: int | None) -> tuple[Minimum, list[Minimum]]:
     """The best fit, and the other minima that starts led to: from more trial chutes where those that are tried first
     lead to nothing that resembles the measurements."""
-    best, others = _searched_from(objective, candidates(objective, first, trials))
-    if trials is None and best.chi2 > _HOPELESS * objective.count:
-        again, more = _searched_from(objective, candidates(objective, first, MANY_TRIALS))
-        if again.chi2 < best.chi2:
-            return again, more
-    return best, others
+    if trials is not None:
+        return _searched_from(objective, candidates(objective, first, trials))
+    with suppress(InputError):
+        best, others = _searched_from(objective, candidates(objective, first))
+        if best.chi2 < _HOPELESS * objective.count:
+            return best, others
+    return _searched_from(objective, candidates(objective, first, MANY_TRIALS))
 
 
 def _searched_from(objective: Objective, starts: Sequence[Candidate]) -> tuple[Minimum, list[Minimum]]:
