@@ -65,9 +65,12 @@ def as_measurements(measured: Measured, widening: float = 1.0) -> Measurements:
     known = all(field in measured.errors and (measured.errors[field][kept] > 0.0).all() for field in names.values())
     if not kept.any():
         raise InputError(f"no height has p/M from {low:g} to {high:g}: there is nothing to fit")
+    values = {symbol: measured.fields[field][kept] for symbol, field in names.items()}
     return measurements(
         measured.height[kept],
-        **{symbol: measured.fields[field][kept] for symbol, field in names.items()},
+        nu=values["nu"],
+        T=values["T"],
+        u=values["u"],
         numbers={"M": measured.holdup},
         errors={symbol: widening * measured.errors[field][kept] for symbol, field in names.items()} if known else None,
     )

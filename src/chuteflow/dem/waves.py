@@ -15,11 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.dem import script
 from chuteflow.dem.output import Array, read_waves
 from chuteflow.dem.run import Run
 from chuteflow.errors import InputError
+
+Complex = NDArray[np.complex128]
 
 #: Directions of the waves, with the first column of waves.txt of each.
 DIRECTIONS = {"along": 0, "across": 4}
@@ -37,8 +40,8 @@ class Amplitudes:
     over the grains of exp(-i k x) and of the velocity down the slope times that; ``wavenumber`` is k."""
 
     times: Array
-    density: Array
-    momentum: Array
+    density: Complex
+    momentum: Complex
     wavenumber: float
 
     def within(self, begin: float, end: float) -> Amplitudes:
