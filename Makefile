@@ -79,9 +79,16 @@ dem-study: $(VENV)/.compiled $(VENV)/.packages-dem ## simulate the study of theo
 
 wheel: dist/.built ## build the wheel into dist/
 
-dist: $(VENV)/.packages-test ## build the source archive and the wheel of a release into dist/
+dist: $(VENV)/.packages-test ## build the source archive and the wheel of a release into dist/, and try both
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist .
+	for file in dist/*; do \
+		echo "== trying $$file in an empty environment"; \
+		$(PYTHON) -m venv --clear build/empty; \
+		build/empty/bin/python -m pip --disable-pip-version-check install --quiet --progress-bar off "$$file"; \
+		(cd build && empty/bin/chuteflow solve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3); \
+	done
+	rm -rf build/empty
 
 clean: ## remove the environment and all that was made
 	rm -rf $(VENV) dist build demo .hypothesis .pytest_cache .ruff_cache
@@ -107,7 +114,7 @@ $(VENV)/.package: dist/.built
 
 $(VENV)/.packages-run: pyproject.toml constraints.txt | $(VENV)/.package
 	@echo "== installing the packages that it runs on"
-	@$(INSTALL) "$(WHEEL)"
+	@$(INSTALL) "$(WHEEL)[explore,sweep,units]"
 	@touch $@
 
 # The loops of the search are compiled at their first call, and kept beside the package.

@@ -1,7 +1,7 @@
 """The Q-h curve of the paper's figure 3, with both folds, by this package and by what one would pick instead.
 
 All start from the flow with Q = 6 on the hot branch and go down to the cold one with Q = 0.7, which has
-T_inf = 0.0101. The package also finds out, at each run, whether there are other families. Folds and the flows at
+T_inf = 0.0101. The package also finds out, at each run, whether there are other branches. Folds and the flows at
 Q = 3 are compared with those of the package at its tightest tolerance; it and the paper's method, which share no
 discretisation, agree to 1e-9.
 """
@@ -39,7 +39,7 @@ def compared() -> list[Row]:
     drift = float(np.abs(_folds(_own())[0] / folds - 1.0).max())
     rows = [
         Row(
-            f"chuteflow: all families, {POINTS} points",
+            f"chuteflow: all branches, {POINTS} points",
             own,
             "ms",
             own,

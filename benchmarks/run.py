@@ -97,7 +97,7 @@ def search() -> list[Row]:
             "three flows at Q = 3, whole search, cold", cold.wall, "ms", cold.cpu, 15.0, 50.0, note="all caches cleared"
         ),
         Row("the same, warm", warm.wall, "ms", warm.cpu, note="closure table and grids at hand"),
-        Row("the same chute again", again.wall, "ms", again.cpu, note="its families at hand: flows at another flux"),
+        Row("the same chute again", again.wall, "ms", again.cpu, note="its branches at hand: flows at another flux"),
     ]
 
 

@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chuteflow.branches.families import families
-from chuteflow.trajectories.refining import carry_down
+from chuteflow.branches.solution_branches import find_branches
+from chuteflow.trajectories.refining import integrate_trajectories
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ def forget() -> None:
 
 
 def forget_search() -> None:
-    """Forget the families of the last chutes, and nothing else."""
-    families.cache_clear()
-    carry_down.cache_clear()
+    """Forget the branches of the last chutes, and nothing else."""
+    find_branches.cache_clear()
+    integrate_trajectories.cache_clear()
 
 
 def _processor_time() -> float:

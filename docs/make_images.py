@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation anew: python docs/make_images.py [NAME ...], some minutes for all.
+"""Draw the pictures of the documentation: python docs/make_images.py [NAME ...], some minutes for all.
 
 Those that a page draws itself while it is built are not among them.
 """

@@ -6,6 +6,7 @@ import inspect
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from importlib import import_module
@@ -67,11 +68,51 @@ def test_the_installed_package_is_that_of_the_source_folder():
 
 
 def test_versions_agree():
+    version = chuteflow.__version__
+    assert importlib.metadata.version("chuteflow") == version
+    for name in ("CITATION.cff", ".zenodo.json", "packaging/conda/meta.yaml"):
+        told = re.findall(r'^ *"?version"?: *"?([^",\n]+)', (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)
+        assert told == [version], name
+    assert f"\n## [{version}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_recipe_for_conda_has_the_same_requirements():
+    def names(requirements):
+        return {re.split(r"[^\w-]", one)[0].replace("-base", "") for one in requirements}
+
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert chuteflow.__version__ == project["version"]
-    assert importlib.metadata.version("chuteflow") == project["version"]
-    assert re.findall(r"^version: *(\S+)$", citation, re.MULTILINE) == [project["version"]]
+    extras = project["optional-dependencies"]
+    asked = [
+        *project["dependencies"],
+        *(one for name in ("explore", "sweep", "tables", "units") for one in extras[name]),
+    ]
+    recipe = (ROOT / "packaging/conda/meta.yaml").read_text(encoding="utf-8")
+    run = recipe.partition("  run:\n")[2].partition("\n\n")[0]
+    assert names(re.findall(r"- (\S+)", run)) - {"python"} == names(asked)
+
+
+@pytest.mark.parametrize(
+    ("package", "arguments", "extra"),
+    [
+        ("uvicorn", ["explore", "--port", "0", "--no-browser"], "explore"),
+        ("starlette", ["explore", "--port", "0", "--no-browser"], "explore"),
+        ("pint", ["solve", "--slope", "0.3", "--e", "0.8", "--ew", "0.8", "--roughness", "0.6", "--flux", "3 m^2/s",
+                  "--diameter", "1 mm", "--density", "2500 kg/m^3"], "units"),
+        ("distributed", ["sweep", "study.toml", "--out", "study.zarr", "--cluster", "127.0.0.1:1"], "cluster"),
+        ("zarr", ["sweep", "study.toml", "--out", "study.zarr"], "sweep"),
+    ],
+)  # fmt: skip
+def test_without_the_package_of_an_extra_a_line_says_what_to_install(package, arguments, extra, tmp_path):
+    (tmp_path / "study.toml").write_text(
+        "[parameters]\nslope = 0.3\ne = 0.8\new = 0.8\nroughness = 0.6\nT_surface = [1.0, 2.0]\n", encoding="utf-8"
+    )
+    code = f"import sys; sys.modules['{package}'] = None\nfrom chuteflow.__main__ import run\nsys.exit(run())"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.splitlines()[-1].endswith(f"which is not installed: pip install 'chuteflow[{extra}]'")
+    assert "Traceback" not in done.stderr
 
 
 # The checks
@@ -269,7 +310,58 @@ def functions_imported(module: str) -> set[str]:
 def test_pictures_compute_nothing():
     drawn = {module: functions_imported(module) - DRAWING for module in MODULES if layer_of(module) == "plotting"}
     assert {module: found for module, found in drawn.items() if found} == {}
-    assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count"}
+    assert functions_imported("chuteflow.bifurcations.diagram") > {"chuteflow.bifurcations.regions.count_flows"}
+
+
+def class_names(sources: dict[str, str]) -> dict[str, list[str]]:
+    """The modules that define a class of each name; a leading underscore makes no other name of one."""
+    found: dict[str, list[str]] = {}
+    for module, source in sources.items():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name.lstrip("_"), []).append(module)
+    return found
+
+
+def test_a_class_name_has_one_meaning():
+    names = class_names({module: path.read_text(encoding="utf-8") for module, path in MODULES.items()})
+    assert {name: modules for name, modules in names.items() if len(modules) > 1} == {}
+
+
+def test_a_class_name_with_two_meanings_is_seen():
+    assert class_names({"a": "class Point: ...", "b": "class _Point: ...\nclass Line: ..."}) == {
+        "Point": ["a", "b"],
+        "Line": ["b"],
+    }
+
+
+def named_objects() -> Iterator[tuple[Path, str]]:
+    """The dotted names to which the documentation and the docstrings refer."""
+    role = re.compile(r"(?:\{py:\w+\}|:(?:class|func|meth|attr|data|mod):)`~?(chuteflow[\w.]*)`")
+    for path in [*(ROOT / "docs").rglob("*.md"), *MODULES.values()]:
+        for found in role.finditer(path.read_text(encoding="utf-8")):
+            yield path.relative_to(ROOT), found[1]
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name is a module, or something in one."""
+    module = module_named(name)
+    if module is None:
+        return False
+    found: object = import_module(module)
+    for part in name.removeprefix(module).strip(".").split(".") if name != module else ():
+        if part in getattr(found, "__dataclass_fields__", {}):
+            return True
+        if not hasattr(found, part):
+            return False
+        found = getattr(found, part)
+    return True
+
+
+def test_the_documentation_refers_to_what_exists():
+    assert [(str(path), name) for path, name in named_objects() if not exists(name)] == []
+    assert not exists("chuteflow.trajectories.kernel.walk")
+    assert not exists("chuteflow.walk")
 
 
 def test_only_the_command_line_prints():

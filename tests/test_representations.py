@@ -9,7 +9,7 @@ import pytest
 import chuteflow
 from chuteflow import display
 from chuteflow.maps import Domain
-from chuteflow.stability.along import MarkedBranch, MarkedCurve, Run, Sample
+from chuteflow.stability.along import MarkedBranch, MarkedCurve, Sample, StabilityRun
 from chuteflow.stability.neutral import NeutralCurve
 from chuteflow.stability.planes import FamilyMap, WaveMap
 
@@ -45,7 +45,7 @@ def public_results():
     stability = chuteflow.stability_of(paper_flows()[2], kx=0.01, ky=0.0)
     branch = paper_curve().branches[0]
     sample = Sample(0.0, paper_flows()[2], stability)
-    marked = MarkedBranch(branch, (sample,) * 24, (Run("stable", branch.flows),), ())
+    marked = MarkedBranch(branch, (sample,) * 24, (StabilityRun("stable", branch.flows),), ())
     return [
         CHUTE,
         paper_flows(),
@@ -111,7 +111,7 @@ def test_lines_hold_the_numbers_that_place_a_flow():
         "<Flow: hot, dilute, deep; Q = 3, h = 8.8389, M = 0.43922, T_surface = 7.3386, "
     )
     assert repr(paper_flows()) == "<FlowSet: 3 flows; T_surface = 7.3386, 2.5405, 0.19681>"
-    assert repr(paper_curve()).startswith("<Curve: 1 family, 200 flows; Q from ")
+    assert repr(paper_curve()).startswith("<Curve: 1 branch, 200 flows; Q from ")
     assert repr(chuteflow.flows(NOWHERE, Q=3.0)).startswith("<FlowSet: 0 flows; ")
 
 

@@ -222,7 +222,7 @@ def test_without_pandas_a_line_says_what_is_missing():
         "except chuteflow.InputError as error: print(error)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "to_dataframe needs pandas, which is not installed: pip install pandas\n"
+    assert done.stdout == "to_dataframe needs pandas, which is not installed: pip install 'chuteflow[tables]'\n"
 
 
 @pytest.mark.slow

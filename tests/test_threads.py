@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from chuteflow.threads import VARIABLES, on_one_thread
 
-#: Its families need grids on which LAPACK with two threads has other bits than with one.
+#: Its branches need grids on which LAPACK with two threads has other bits than with one.
 DEEP = ("0.49126", "0.632", "0.5484", "0.8133")
 
 

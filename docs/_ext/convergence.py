@@ -38,11 +38,11 @@ def drawn():
     figure, axes = style.panels(3, height=3.1, shared_y=True)
     for ax, name, flow in zip(axes, "ABC", flows(dissipative(0.3), Q=_FLUX, tolerance=1e-11), strict=True):
         best = best_multiple(flow.centre_of_mass / flow.surface_temperature)
-        lines = {"overburden": (_overburden(flow), style.Stroke(style.BLUE, style.SOLID))}
-        lines["mapped, $L = 2\\,T_\\infty$"] = (_mapped(flow, 1), style.Stroke(style.VERMILION, style.DASHED))
+        lines = {"overburden": (_overburden(flow), style.LineStyle(style.BLUE, style.SOLID))}
+        lines["mapped, $L = 2\\,T_\\infty$"] = (_mapped(flow, 1), style.LineStyle(style.VERMILION, style.DASHED))
         if best > 1:
             words = f"mapped, $L = {2 * best}\\,T_\\infty$"
-            lines[words] = (_mapped(flow, best), style.Stroke(style.GREEN, style.DASH_DOTTED))
+            lines[words] = (_mapped(flow, best), style.LineStyle(style.GREEN, style.DASH_DOTTED))
         for words, (sizes, stroke) in lines.items():
             ax.semilogy(np.arange(len(sizes)), sizes, label=words, **stroke.line())
         style.name_axes(ax, "number of the coefficient", "size, over the largest" if name == "A" else None)

@@ -1,7 +1,7 @@
 """Equations of the paper: where they stand, what implements them, and links both ways.
 
 - ``{equation} 3.16`` shows an equation under its number. The option ``code`` names what implements it, as dotted
-  paths with commas between; the option ``printed`` tells a misprint that is mended here.
+  paths separated by commas; the option ``printed`` tells a misprint that is mended here.
 - ``{eqn}`3.16``` is a link to an equation from anywhere. Docstrings get such links without asking.
 - ``{eq-code}`(3.16) chuteflow.theory.boundary.slip_coefficient``` is a link to code in a line of text.
 

@@ -42,7 +42,7 @@ def drawn(found: FlowSet):
     top = 1.1 * max(flow.depth for flow in found)
     for i, (ax, flow) in enumerate(zip(axes, found, strict=False)):
         z = np.linspace(0.0, top, _POINTS)
-        ax.plot(flow.profile(z).volume_fraction, z, **style.Stroke(style.BLUE).line())
+        ax.plot(flow.profile(z).volume_fraction, z, **style.LineStyle(style.BLUE).line())
         left, below = i % _COLUMNS == 0, i >= len(found) - _COLUMNS
         style.name_axes(ax, "$\\nu$" if below else None, "height, $z$" if left else None)
         ax.set_xlim(0.0, 0.65)

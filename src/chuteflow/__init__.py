@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from chuteflow.stability.disturbed import growth, neutral, relax
     from chuteflow.stability.planes import FamilyMap, WaveMap
     from chuteflow.stability.relaxation import Relaxation
-    from chuteflow.stability.verdict import Stability, stability_of
+    from chuteflow.stability.result import Stability, stability_of
     from chuteflow.steady.cases import Case, case
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from chuteflow.sweeps.sweep import sweep
     from chuteflow.theory.laws import closures
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Imported when first asked for, so that the command line starts quickly.
 _HOMES = {
@@ -62,7 +62,7 @@ _HOMES = {
     "Searched": "branches.results",
     "SolveError": "errors",
     "SpecialPoint": "branches.results",
-    "Stability": "stability.verdict",
+    "Stability": "stability.result",
     "Fit": "fitting.calibration",
     "Measurements": "fitting.measurements",
     "compare": "fitting.comparison",
@@ -89,7 +89,7 @@ _HOMES = {
     "relax": "stability.disturbed",
     "save": "io.files",
     "scan": "sweeps.scan",
-    "stability_of": "stability.verdict",
+    "stability_of": "stability.result",
     "sweep": "sweeps.sweep",
 }
 

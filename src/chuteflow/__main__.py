@@ -18,7 +18,7 @@ def run() -> int:
     except KeyboardInterrupt:
         from chuteflow.cli import interrupts
 
-        return interrupts.tell()
+        return interrupts.report()
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ class Parameter:
     ``name`` is the argument of :class:`chuteflow.Chute`, ``key`` the name in JSON, in studies and on the command line;
     ``noun``, ``symbol`` and ``latex`` its notation, ``label`` what messages call it. It is from ``low`` to ``high``, as
     ``allowed`` says in short and ``rule`` in full; a value that is above ``high`` by no more than ``rounding`` is taken
-    for it. ``of_base`` tells whether it belongs to the base alone. All parameters are dimensionless.
+    for it. ``of_base`` is whether it belongs to the base alone. All parameters are dimensionless.
     """
 
     name: str
@@ -60,8 +60,8 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Condition:
-    """A number that picks flows out of a family.
+class FlowCondition:
+    """A number that picks flows out of a branch.
 
     ``key`` is the argument of :func:`chuteflow.flows` and the symbol in JSON and studies, ``quantity`` the name in the
     registry of quantities, ``option`` that on the command line. It is from ``low`` to ``high``.
@@ -149,7 +149,7 @@ BY_KEY: dict[str, Parameter] = {parameter.key: parameter for parameter in PARAME
 #: What else a chute has, each a name out of a list.
 NAMES = ("surface", "closure")
 
-#: Range searched unless another is asked for.
+#: Range searched by default.
 SURFACE_TEMPERATURE = (1e-3, 1e5)
 LARGEST_HOLDUP = 30.0
 #: What can be searched at all.
@@ -157,12 +157,12 @@ WIDEST, SHALLOWEST, DEEPEST = (1e-24, 1e20), 1e-9, 300.0
 
 _LEAST, _MOST = 1e-12, 1e12
 #: Conditions on the flows of a chute, by their keys.
-CONDITIONS: dict[str, Condition] = {
+CONDITIONS: dict[str, FlowCondition] = {
     condition.key: condition
     for condition in (
-        Condition("T_surface", "surface_temperature", "temperature", *WIDEST, "surface temperature"),
-        Condition("Q", "mass_flux", "flux", _LEAST, _MOST, "mass flux"),
-        Condition("M", "mass_holdup", "holdup", _LEAST, DEEPEST, "mass hold-up"),
-        Condition("h", "centre_of_mass", "centre_of_mass", _LEAST, _MOST, "centre of mass"),
+        FlowCondition("T_surface", "surface_temperature", "temperature", *WIDEST, "surface temperature"),
+        FlowCondition("Q", "mass_flux", "flux", _LEAST, _MOST, "mass flux"),
+        FlowCondition("M", "mass_holdup", "holdup", _LEAST, DEEPEST, "mass hold-up"),
+        FlowCondition("h", "centre_of_mass", "centre_of_mass", _LEAST, _MOST, "centre of mass"),
     )
 }

@@ -27,7 +27,7 @@ R = TypeVar("R")
 
 # The environment is that of all threads.
 _environment = RLock()
-#: The exit code of a worker that was about to run the script of its parent once more.
+#: The exit code of a worker that was about to run the script of its parent again.
 _RUNS_SCRIPT = 76
 #: Seconds that a dead process takes to be known as dead.
 _MOMENT = 0.5
@@ -114,7 +114,7 @@ def death(pool: Executor) -> WorkerError:
             "the workers cannot start: each imports the script that computes in several processes, so put what the "
             'script does under if __name__ == "__main__":, or use one process'
         )
-    return WorkerError("a worker died, perhaps for want of memory: use fewer processes, or give them more memory")
+    return WorkerError("a worker died, perhaps for lack of memory: use fewer processes, or give them more memory")
 
 
 def begin_worker() -> None:

@@ -8,9 +8,9 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, InputError, boundary, curve, flows
-from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion, Local
-from chuteflow.bifurcations.regions import count, limits, sides
-from chuteflow.bifurcations.system import Sweep
+from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion, Linearisation
+from chuteflow.bifurcations.regions import count_flows, find_kinds_beside, find_range_edges
+from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL
 from chuteflow.steady.collocation import LOG_Q, LOG_T, Collocation
 from chuteflow.steady.hot import hot
@@ -123,7 +123,7 @@ def test_inversions_begin_and_are_complete_at_the_slopes_of_the_paper(onset):
     assert first == pytest.approx(0.29, abs=1e-3)
     assert line.parameter.max() == pytest.approx(0.333, abs=4e-3)
     index = len(line.flows) // 2
-    assert sides(line, LOG_T, index) == ("monotonic", "inverted")
+    assert find_kinds_beside(line, LOG_T, index) == ("monotonic", "inverted")
 
 
 def test_the_onset_of_inversion_tends_to_the_exact_hot_limit_like_one_over_the_temperature(onset):
@@ -139,7 +139,7 @@ def test_the_onset_of_inversion_tends_to_the_exact_hot_limit_like_one_over_the_t
 
 
 def test_the_hottest_limit_of_the_range_is_that_of_the_exact_hot_flow(folds):
-    (line,) = [line for line in limits(folds) if line.surface_temperature.min() > 9e4]
+    (line,) = [line for line in find_range_edges(folds) if line.surface_temperature.min() > 9e4]
     for flow in (line.flows[0], line.flows[-1]):
         assert flow.mass_holdup == pytest.approx(hot(flow.chute).as_dict()["M"], rel=1e-4)
 
@@ -189,7 +189,7 @@ def test_a_parameter_may_end_where_chutes_end():
 
 def test_regions_are_counted(folds):
     low, high = sorted(flow.mass_flux for line in folds for flow in line.at(0.3))
-    assert [count(folds, 0.3, q) for q in (0.9 * low, (low * high) ** 0.5, 1.1 * high)] == [1, 3, 1]
+    assert [count_flows(folds, 0.3, q) for q in (0.9 * low, (low * high) ** 0.5, 1.1 * high)] == [1, 3, 1]
 
 
 def test_nothing_to_follow_has_a_reason():
@@ -206,14 +206,14 @@ def conditions():
     yield Inversion()
     yield InteriorChange(False)
     yield InteriorChange(True)
-    yield Held(LOG_Q, 0.3)
+    yield FixedQuantity(LOG_Q, 0.3)
 
 
 @pytest.mark.parametrize("second", ["slope", "restitution", "wall_restitution", "roughness"])
 def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, second):
     point = folds[0].traced.points[3]
     value = getattr(point.flow.chute, second)
-    sweep = Sweep(point.flow.chute, second, 0.9 * value, 1.1 * value)
+    sweep = SecondParameter(point.flow.chute, second, 0.9 * value, 1.1 * value)
     degree, stretch = point.system.degree, point.system.stretch
     rng = np.random.default_rng(5)
     z = point.w[:-1] + 1e-3 * rng.standard_normal(len(point.w) - 1)
@@ -222,7 +222,7 @@ def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, sec
 
     def local(z, value):
         here, beyond = sweep.models(value)
-        return Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), z)
+        return Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), z)
 
     base = local(z, value)
     made = [point.system.condition.based(base), *conditions()]
@@ -263,7 +263,7 @@ def test_bad_input(given, message):
 
 def test_only_folds_bound_numbers_of_flows(onset):
     with pytest.raises(InputError, match="do not bound numbers of flows"):
-        count(onset, 0.3, 1.0)
+        count_flows(onset, 0.3, 1.0)
 
 
 def test_the_names_are_at_the_top_of_the_package(folds):

@@ -101,7 +101,7 @@ def test_two_flows_beside_a_fold_are_found_where_the_first_and_last_rough_flows_
 
 @pytest.mark.parametrize(("condition", "value"), [("Q", 7653.573889461369), ("M", 22.416297829409757)])
 def test_flows_where_the_residual_is_near_to_zero_all_along_are_found(condition, value):
-    """Beside the folds of two families the signs of the residual are not known well enough to join what was seen."""
+    """Beside the folds of two branches the signs of the residual are not known well enough to join what was seen."""
     chute = Chute(0.37141429564886336, 0.8023571956699849, 0.5399933535112227, 0.8100380660751175)
     found = flows(chute, **{condition: value})
     assert len(found) == 4

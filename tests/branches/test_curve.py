@@ -1,4 +1,4 @@
-"""Curves: complete families, located special points, independence of the path."""
+"""Curves: complete branches, located special points, independence of the path."""
 
 import numpy as np
 import pytest

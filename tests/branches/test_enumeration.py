@@ -1,4 +1,4 @@
-"""All flows of a chute: the paper's, hidden families, extreme values, and why there is none."""
+"""All flows of a chute: the paper's, hidden branches, extreme values, and why there is none."""
 
 import json
 import time
@@ -9,7 +9,7 @@ import pytest
 
 from chuteflow import Chute, InputError, curve, flows
 from chuteflow.branches.enumeration import flows_within
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.steady.collocation import LOG_Q
 from chuteflow.steady.solver import TOLERANCE
 
@@ -156,7 +156,7 @@ def test_no_flow_strays_to_another_of_its_surface_temperature():
 
 
 def test_a_flow_just_beyond_the_range_extends_it():
-    # The rough end of the family passes the value just inside the range, the flow itself just outside.
+    # The rough end of the branch passes the value just inside the range, the flow itself just outside.
     chute = Chute(0.3701877234047303, 0.5626627358233449, 0.33102981650642344, 0.5128316109822653, "interface")
     (found,) = flows(chute, Q=344.3168597509368)
     assert found.surface_temperature == pytest.approx(1.0037e5, rel=1e-3)
@@ -255,7 +255,7 @@ def test_where_families_are_many_already_the_range_is_not_extended():
 )
 def test_trajectories_need_not_be_followed_to_larger_fluxes(chute, flux):
     every = flows(chute, Q=flux)
-    found = flows_within(chute, LOG_Q, flux, TOLERANCE, Range.checked((1e-3, 1e5), 30.0).restricted(LOG_Q, flux))
+    found = flows_within(chute, LOG_Q, flux, TOLERANCE, SearchRange.checked((1e-3, 1e5), 30.0).restricted(LOG_Q, flux))
     assert len(found) == len(every) > 0
     for one, other in zip(found, every, strict=True):
         assert one.mass_holdup == pytest.approx(other.mass_holdup, rel=1e-9)

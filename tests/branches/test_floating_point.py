@@ -8,7 +8,7 @@ import pytest
 from chuteflow import Chute, ChuteflowError, boundary, curve, flows, hot, stability_of
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
-#: A torn family whose solutions run away on a finer grid.
+#: An unresolved branch whose solutions run away on a finer grid.
 RUNS_AWAY = Chute(0.4713837091075198, 0.7064570046969758, 0.4266495038362583, 0.8214167565470907)
 EMPTY_BEFORE_THE_BASE = Chute(
     0.4650749812672964, 0.4796664369844508, 0.5040403790953422, 0.7090609648824436, closure="lun-fourier"

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, flows
-from chuteflow.branches.families import traced_families
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import trace_branches
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.model import model
@@ -30,16 +30,16 @@ def macroscopic(flow):
 
 
 def searched(chute):
-    return Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    return SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
 
 
 def scanned(chute):
     """The flows of each branch in order, and their quantities (k, 4)."""
-    for family in traced_families(model(chute), searched(chute)):
+    for branch in trace_branches(model(chute), searched(chute)):
         # What the branch was followed by shows peaks that are narrower than the distance of the samples.
-        places = np.union1d(np.linspace(0.0, family.arclength[-1], DENSE), family.arclength)
+        places = np.union1d(np.linspace(0.0, branch.arclength[-1], DENSE), branch.arclength)
         places = places[np.append(True, np.diff(places) > 1e-9)]
-        solutions = [point.solution for point in family.at(places, 1e-9)]
+        solutions = [point.solution for point in branch.at(places, 1e-9)]
         yield solutions, np.array([solution.macroscopic for solution in solutions])
 
 
@@ -70,7 +70,7 @@ def random_chute(random):
 
 
 def folds_in_flux(chute):
-    return sum(len(family.turns(LOG_Q, 1e-10)) for family in traced_families(model(chute), searched(chute)))
+    return sum(len(branch.turns(LOG_Q, 1e-10)) for branch in trace_branches(model(chute), searched(chute)))
 
 
 def past_a_cusp(random):

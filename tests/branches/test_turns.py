@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, flows
-from chuteflow.branches.families import traced_families
-from chuteflow.branches.paths import Chord, turns
-from chuteflow.branches.ranges import Range
-from chuteflow.branches.rough_turns import dips, may_turn
+from chuteflow.branches.paths import Chord, locate_turning_points
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.rough_turns import find_extrema, may_turn
+from chuteflow.branches.solution_branches import trace_branches
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
 from chuteflow.steady.model import model
@@ -22,8 +22,8 @@ FOLDS = {1e-5: (897.18333, 897.193459), 3e-5: (899.026048, 899.078891), 1e-3: (9
 
 
 def branches(chute):
-    within = Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
-    return traced_families(model(chute), within)
+    within = SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP, chute.surface)
+    return trace_branches(model(chute), within)
 
 
 def reached(chord, sigma):
@@ -77,7 +77,7 @@ def test_two_folds_far_between_two_flows_are_seen():
     found = [turn for turn in branch.turns(LOG_Q, 1e-10) if turn.point.m[LOG_Q] > np.log(500.0)]
     low, high = (int(turn.place) for turn in found)
     for wide in (1, 2):
-        assert len(turns([every[low - wide], every[high + 1 + wide]], LOG_Q)) == 2
+        assert len(locate_turning_points([every[low - wide], every[high + 1 + wide]], LOG_Q)) == 2
 
 
 @pytest.mark.parametrize(("beyond", "expected"), FOLDS.items())
@@ -97,8 +97,8 @@ def test_special_points_are_the_same_for_ten_points_and_for_four_thousand():
                 # The position is that of the flow just before it.
                 for point, branch in ((one, few), (other, many)):
                     mass = np.log(branch.mass_holdup / point.flow.mass_holdup)
-                    warmth = np.log(branch.surface_temperature / point.flow.surface_temperature)
-                    assert np.argmin(np.hypot(mass, warmth)) - point.position in (0, 1)
+                    log_temperature = np.log(branch.surface_temperature / point.flow.surface_temperature)
+                    assert np.argmin(np.hypot(mass, log_temperature)) - point.position in (0, 1)
 
 
 def test_four_flows_of_one_flux_between_two_folds_past_a_cusp():
@@ -159,7 +159,7 @@ def test_turns_that_rounding_makes_are_none():
     chute = Chute(0.4191510618260981, 0.7559395567904552, 0.6770602401681308, 0.5726889224411995)
     (branch,) = branches(chute)
     assert np.ptp(branch.macroscopic[-4:, LOG_T]) < 1e-8
-    assert turns(branch.points[-6:], LOG_T) == []
+    assert locate_turning_points(branch.points[-6:], LOG_T) == []
 
 
 def test_rough_slopes_tell_where_a_quantity_may_turn():
@@ -176,12 +176,12 @@ def test_rough_slopes_tell_where_a_quantity_may_turn():
 
 def test_a_dip_between_two_points_is_seen_with_its_zeros():
     place = np.array([-1.5, -0.7, 0.4, 1.2])
-    (dip,) = dips(place**2 - 0.09, place)
+    (dip,) = find_extrema(place**2 - 0.09, place)
     assert dip.step == 1
     assert dip.value < 0.0
     zeros = [place[1] + share * (place[2] - place[1]) for share in dip.zeros]
     assert zeros == pytest.approx([-0.3, 0.3], abs=0.1)
-    assert [dip.zeros for dip in dips(place**2 + 0.3, place)] == [()]
+    assert [dip.zeros for dip in find_extrema(place**2 + 0.3, place)] == [()]
 
 
 def test_the_centre_of_mass_may_turn_too():
@@ -200,7 +200,7 @@ def test_flows_on_both_sides_of_a_turn_that_rough_flows_put_elsewhere():
 
 
 def test_a_flow_between_the_edge_of_the_range_and_a_rough_end_is_not_lost():
-    # Q turns at T = 0.00103567; the range ends at 0.001, and the rough end of the family lies a percent inside it.
+    # Q turns at T = 0.00103567; the range ends at 0.001, and the rough end of the branch lies a percent inside it.
     chute = Chute(0.1980454992720526, 0.8295696341995824, 0.5950206565393283, 0.5242155716627819, surface="interface")
     found = flows(chute, Q=5.079250231686532e-05)
     assert [flow.surface_temperature for flow in found] == pytest.approx([0.0010596683, 0.0010142], rel=4e-3)

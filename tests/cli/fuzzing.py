@@ -57,7 +57,8 @@ COMMANDS = {
     "figures": {"--only": ("99", "0", "2,,3", "-1"), "--out": FILES, "--format": NAMES, "--method": NAMES},
     "report": {"--only": ("99", "x"), "--method": NAMES, "--no-claims": None},
     "sweep": {"--out": FILES, "--workers": ("0", "-1"), "--chunks": RANGES, "--dry-run": None, "--status": None},
-    "explore": {"--port": ("-1", "99999", "x"), "--host": ("", "no such host", "\x00")},
+    "explore": MATERIAL | LAW | SCALES | {"--flux": NUMBERS, "--export": FILES, "--search-temperature": RANGES}
+    | {"--port": ("-1", "99999", "x"), "--host": ("", "no such host", "\x00")},
 }  # fmt: skip
 #: Commands that take seconds where their input is good: they are given something bad, most of the time.
 SLOW = [name for name in COMMANDS if name not in ("solve", "curve", "hot")]
@@ -216,7 +217,7 @@ def try_command_lines(count: int, seed: int) -> tuple[list[str], Counter]:
 def try_files(wholes, same, folder, count: int, seed: int) -> tuple[list[str], Counter]:
     """Faults of ``count`` damaged copies of the files ``wholes``, made in ``folder``, and how often each end came.
 
-    ``same(whole, found)`` tells whether what was loaded is what the whole file holds.
+    ``same(whole, found)`` is whether what was loaded is what the whole file holds.
     """
     dice = random.Random(seed)
     faults, ends = [], Counter()

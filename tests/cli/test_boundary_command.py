@@ -96,7 +96,7 @@ def test_a_picture_counts_the_flows_of_every_region(folds):
 
 def test_a_region_whose_places_disagree_has_no_number(folds, monkeypatch):
     counts = iter(range(100))
-    monkeypatch.setattr(diagrams, "count", lambda found, value, quantity: next(counts))
+    monkeypatch.setattr(diagrams, "count_flows", lambda found, value, quantity: next(counts))
     assert texts(plot_boundaries(diagram(folds))) == []
 
 
@@ -109,7 +109,7 @@ def test_nothing_to_draw_is_drawn_with_its_reason(capsys, tmp_path):
     line = ["--of", "fold-M", "--slope", "0.29:0.3", *MATERIAL, "--samples", "2", "--plot", str(picture)]
     code, out, _ = run(capsys, *line)
     assert code == 0
-    assert "no boundary: no family of flows in the range searched has a point of the kind fold-M" in out
+    assert "no boundary: no branch of flows in the range searched has a point of the kind fold-M" in out
     assert picture.exists()
 
 

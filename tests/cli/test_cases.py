@@ -275,7 +275,7 @@ WITHOUT = {
     # A group: its parts have options.
     "dem": ("chute", "case", "si", "json", "save", "plot", "quiet"),
     "compare": ("chute", "case", "si"),
-    "explore": ("chute", "case", "si", "json", "save", "plot", "quiet"),
+    "explore": ("json", "save", "plot"),
 }
 
 

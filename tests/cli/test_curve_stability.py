@@ -45,7 +45,7 @@ def test_the_table_has_the_changes_and_the_stretches_in_words(capsys):
     ]
 
 
-def test_json_has_the_special_points_and_the_judged_flows(capsys):
+def test_json_has_the_special_points_and_the_examined_flows(capsys):
     assert run(f"{CURVE} --stability --samples 10 --json") == 0
     (branch,) = json.loads(capsys.readouterr().out)["branches"]
     changes = [point for point in branch["special"] if point["kind"] == "stability-change"]
@@ -69,7 +69,7 @@ def test_files_keep_the_special_points(capsys, tmp_path, ending):
 
 def test_the_picture_is_solid_where_stable_and_dashed_where_not():
     curve = chuteflow.curve(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), points=40, surface_temperature=(0.3, 10.0))
-    figure = plot_marked(along.marked(curve, samples=10))
+    figure = plot_marked(along.mark_stability(curve, samples=10))
     lines = [line for line in figure.axes[0].get_lines() if np.size(line.get_xdata()) > 1]
     assert [line.get_linestyle() for line in lines] == ["--", "-", "--"]
     assert len({line.get_color() for line in lines}) == 3

@@ -61,7 +61,7 @@ def test_the_first_range_is_on_the_horizontal_axis(capsys):
 def test_text_says_what_was_found_and_how_well(capsys):
     assert main(["domain", *AXES, *REST, "--temperature", "10"]) == 0
     printed = capsys.readouterr().out
-    for words in ("share of the plane", "flow at T = 10", "located to 0.05", "searched: T_surface"):
+    for words in ("fraction of the plane", "flow at T = 10", "located to 0.05", "searched: T_surface"):
         assert words in printed
 
 

@@ -98,7 +98,7 @@ def test_a_family_with_unresolved_waves_is_mapped(capsys, tmp_path, size):
 @pytest.mark.slow
 def test_waves_along_a_family(capsys, tmp_path):
     words = f"neutral {PAPER} --search-temperature 0.5:8 --kh 0.005:0.3 --size 5x5"
-    assert run(f"{words} --plot {tmp_path / 'family.png'} --save {tmp_path / 'family.csv'} --json") == 0
+    assert run(f"{words} --plot {tmp_path / 'branch.png'} --save {tmp_path / 'branch.csv'} --json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert np.shape(printed["growth"]) == (5, 5)
     assert len(printed["neutral"]) == 2

@@ -85,7 +85,7 @@ def test_after_a_search_the_text_has_the_verdict_the_threshold_and_what_is_not_k
     assert flow["stable"] is None
     assert flow["complete"] is True
     assert {"kx": 0.0, "ky": 0.0} in flow["unresolved"]
-    assert "do not tell" in flow["why"]
+    assert "do not resolve" in flow["why"]
     code, out, _ = run(capsys, *calm)
     assert "not known: nothing is known to grow" in out
     assert "kx = 0 and ky = 0" in out

@@ -100,7 +100,7 @@ def test_points_that_failed_are_listed_by_status(tmp_path, capsys):
     ("arguments", "message"),
     [
         ((), "missing --out STORE, for example --out study.zarr"),
-        (("--out", "none.zarr", "--status"), "there is no store none.zarr as yet"),
+        (("--out", "none.zarr", "--status"), "there is no store none.zarr yet"),
         (("--out", "study.toml"), "study.toml is no store of a study: take a path that does not exist yet"),
         (("--out", "s.zarr", "--workers", "0"), "--workers 0: must be 1 or more"),
         (("--dry-run", "--workers", "0"), "--workers 0: must be 1 or more"),

@@ -15,7 +15,7 @@ from chuteflow.errors import InputError
 
 SCHEDULE = Schedule(settle=2.0, measure=4.0, block=1.0)
 
-#: A program in place of LAMMPS: it writes lines of totals.txt up to a share of its steps, and ends as told.
+#: A program in place of LAMMPS: it writes lines of totals.txt up to a fraction of its steps, and ends as told.
 FAKE = """#!{python}
 import os, re, sys
 words = open(sys.argv[sys.argv.index("-in") + 1]).read()

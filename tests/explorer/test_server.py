@@ -22,7 +22,7 @@ from starlette.testclient import TestClient
 import chuteflow
 from chuteflow.cli.program import main
 from chuteflow.errors import InputError
-from chuteflow.explorer import answers, domains, growth, queries, sentences
+from chuteflow.explorer import answers, contents, domains, growth, queries, sentences
 from chuteflow.explorer.server import PAGE, application, bound, host_of
 from chuteflow.stability.modes import Disturbances
 from chuteflow.steady.chute import SURFACES
@@ -70,7 +70,7 @@ def test_straight_lines_between_the_points_of_a_profile_show_no_corner_that_is_n
         assert len(z) < 300
         between = np.linspace(0.0, min(z[-1], flow.interface_height), 2001)
         exact = flow.profile(between)
-        for symbol, name in answers._FIELDS.items():
+        for symbol, name in answers.FIELDS.items():
             field = getattr(exact, name)
             off = np.abs(np.interp(between, z, profile[symbol]) - field).max()
             assert off < 1e-3 * np.abs(field).max(), (symbol, off)
@@ -190,7 +190,7 @@ def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeyp
     def summary(plane, outer, inner):
         return (0, int(band[0] < inner < band[1]), 0, 0, 0)
 
-    monkeypatch.setattr(domains, "summary", summary)
+    monkeypatch.setattr(domains, "summarise", summary)
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4"}
     low, high = queries.CONTROLS["roughness"].low, queries.CONTROLS["roughness"].high
     near = ",".join(f"{low + share * (high - low):.4g}" for share in band)
@@ -424,3 +424,49 @@ def fetched(page, path):
         content = response.read()
     assert response.status == 200 or "error" in json.loads(content)
     return response.status
+
+
+def test_stability_is_of_the_flow_of_the_curve_that_was_asked_for(monkeypatch):
+    judged = []
+    monkeypatch.setattr(growth, "verdict", lambda flow: judged.append(flow) or growth.Verdict("stable", (2.0, 50.0)))
+    query = {"slope": "0.3", "e": "0.8", "ew": "0.8", "roughness": "0.6"}
+    branch = json.loads(answers.answer("curve", query).body)["branches"][0]
+    given = json.loads(answers.answer("stability", query | {"branch": "0", "point": "40"}).body)
+    assert given["says"] == "stable: no wave grows"
+    assert judged[0].mass_flux == pytest.approx(branch["Q"][40], rel=1e-6)
+    assert judged[0].centre_of_mass == pytest.approx(branch["h"][40], rel=1e-6)
+    refused = answers.answer("stability", query | {"branch": "0", "point": "90"})
+    assert refused.status == 400
+    assert b"there are 90, counted from 0" in refused.body
+
+
+def test_a_coarse_column_is_like_the_fine_one_but_rougher():
+    query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": str((0.3 - 0.05) / 0.65)}
+    fine, coarse = (json.loads(answers.answer("map", query | more).body) for more in ({}, {"coarse": "1"}))
+    assert coarse["tolerance"] > 3 * fine["tolerance"]
+    assert coarse["parts"]["most"]["values"][0] == fine["parts"]["most"]["values"][0]
+    assert answers.answer("map", query | {"coarse": "yes"}).status == 400
+
+
+@pytest.mark.parametrize(
+    "chute",
+    [
+        chuteflow.Chute(0.3, 0.8, 0.8, 0.6),
+        chuteflow.Chute(0.28, 0.8, 0.8, 0.6),
+        chuteflow.Chute(0.31, 0.8, 0.8, 0.6, surface="interface"),
+    ],
+)
+def test_kinds_of_density_between_onsets_are_those_of_the_flows(chute):
+    for branch in chuteflow.curve(chute, points=40, tolerance=1e-6).branches:
+        assert contents.densities(branch) == [flow.density for flow in branch.flows]
+
+
+def test_limits_passed_along_the_curve(client):
+    curve = client.get("/ask/curve", params=PAPER).json()
+    words = client.get("/ask/limits", params=PAPER).json()["words"]
+    assert [len(one) for one in words] == [len(branch["Q"]) for branch in curve["branches"]]
+    flows = client.get("/ask/flows", params=PAPER | {"Q": "3"}).json()["flows"]
+    (branch,) = curve["branches"]
+    for flow in flows:
+        nearest = int(np.abs(np.log(np.array(branch["h"]) / flow["h"])).argmin())
+        assert words[0][nearest] == flow["validity"]["words"]

@@ -16,7 +16,7 @@ from chuteflow.fitting.direct import direct
 from chuteflow.fitting.measurements import measurements, together
 from chuteflow.fitting.objective import Objective
 from chuteflow.fitting.prediction import predict
-from chuteflow.fitting.residuals import Case, Place
+from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.fitting.sampling import sample
 from chuteflow.steady.free import chosen_parameters
 
@@ -76,9 +76,9 @@ def test_the_jacobian_is_that_of_differences(flow, exact, relative):
     numbers = {"M": 1.2} | ({"Q": 3.0} if exact else {})
     data = exact_profiles(flow, numbers=numbers, **errors)
     free = chosen_parameters(TRUE, FREE, {})
-    case = Case.of(data.experiments[0], TRUE, free)
+    case = TrialChute.of(data.experiments[0], TRUE, free)
     objective = Objective((case,), True, "linear")
-    place = Place.of(case, flow, VALUES)
+    place = TrialFlow.of(case, flow, VALUES)
     linear = case.linear(place, 0.05)
     step = 1e-5
     for j in range(3):
@@ -307,7 +307,7 @@ def test_what_is_known_is_not_free(flow):
 
 def test_sampling_without_its_extra_says_what_to_install(noisy, monkeypatch):
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(InputError, match=r"install chuteflow\[bayes\]"):
+    with pytest.raises(InputError, match=r"install 'chuteflow\[bayes\]'"):
         sample(noisy)
 
 

@@ -11,8 +11,8 @@ import pytest
 from chuteflow import Chute, Domain, InputError, curve, flows, load, save
 from chuteflow.io import contract
 from chuteflow.io.records import checksum
-from chuteflow.maps.columns import Column, Part
-from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane
+from chuteflow.maps.columns import Column, PiecewiseConstant
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 SUFFIXES = [".nc", ".csv", ".json"]
@@ -249,9 +249,11 @@ def test_a_file_may_claim_any_size(tmp_path):
 
 @pytest.fixture
 def small_domain():
-    plane = Plane(Axis("wall_restitution", 0.5, 0.9), Axis("roughness", 0.55, 0.7), PAPER, ())
-    columns = tuple(Column(place, (Part((0.5,), (0, 1)),) * len(CODES)) for place in (0.0, 1.0))
-    hot = tuple(Column(place, (Part((), (1,)),) * len(HOT_CODES)) for place in (0.0, 1.0))
+    plane = ParameterPlane(
+        ParameterAxis("wall_restitution", 0.5, 0.9), ParameterAxis("roughness", 0.55, 0.7), PAPER, ()
+    )
+    columns = tuple(Column(place, (PiecewiseConstant((0.5,), (0, 1)),) * len(CODES)) for place in (0.0, 1.0))
+    hot = tuple(Column(place, (PiecewiseConstant((), (1,)),) * len(HOT_CODES)) for place in (0.0, 1.0))
     return Domain.on_cells(plane, (3, 3), 0.05, columns, hot)
 
 
@@ -265,7 +267,7 @@ def small_domain():
         ({"axes": [["slope", 0.4, 0.3], ["roughness", 0.5, 0.6]]}, "must rise"),
         ({"columns": [[0.0, []], [1.0, []]]}, "a column must have"),
         ({"columns": [[0.0, [[[0.5], [0]]]]]}, "one class more than stops"),
-        ({"columns": [[2.0, []]]}, "a share of an axis = 2"),
+        ({"columns": [[2.0, []]]}, "a fraction of an axis = 2"),
         ({"columns": [[0.5, []], [0.5, []]]}, "must rise"),
         ({"temperatures": ["hot"]}, "temperatures = 'hot'"),
         ({"format": 0}, "format = 0"),

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from chuteflow import Chute, SolveError, curve, flows
-from chuteflow.maps import CODES, Axis, Plane
+from chuteflow.maps import CODES, ParameterAxis, ParameterPlane
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.plane import code
+from chuteflow.maps.plane import classify
 
 #: Ranges in which nearly all flows are.
 RANGES = {
@@ -27,14 +27,17 @@ def random_planes(seed, surface="free"):
     while True:
         x, y = random.choice(list(RANGES), 2, replace=False)
         others: dict[str, Any] = {name: float(random.uniform(*bounds)) for name, bounds in RANGES.items()}
-        plane = Plane(
-            Axis(str(x), *RANGES[x]), Axis(str(y), *RANGES[y]), Chute(**others, surface=surface), TEMPERATURES
+        plane = ParameterPlane(
+            ParameterAxis(str(x), *RANGES[x]),
+            ParameterAxis(str(y), *RANGES[y]),
+            Chute(**others, surface=surface),
+            TEMPERATURES,
         )
         yield plane, tuple(map(float, random.uniform(0.01, 0.99, 2)))
 
 
 def enumerated(chute):
-    """The class of a chute by the curve of all its families and all flows at each temperature."""
+    """The class of a chute by the curve of all its branches and all flows at each temperature."""
     found = curve(chute, tolerance=1e-8, points=300)
     stretches = []
     for branch in found.branches:
@@ -62,7 +65,7 @@ def compare(seed, count, tolerance, surface="free"):
     for _ in range(count):
         plane, (u, v) = next(points)
         chute = plane.chute_at(u, v)
-        mapped = code(plane, u, v)
+        mapped = classify(plane, u, v)
         try:
             solved = enumerated(chute)
         except SolveError as error:
@@ -72,7 +75,7 @@ def compare(seed, count, tolerance, surface="free"):
         if not differ:
             continue
         around = [
-            code(plane, u + a * share * tolerance, v + b * share * tolerance)
+            classify(plane, u + a * share * tolerance, v + b * share * tolerance)
             for share in (1.0, 0.5)
             for a in (-1, 0, 1)
             for b in (-1, 0, 1)

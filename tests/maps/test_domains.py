@@ -6,14 +6,14 @@ import pytest
 from chuteflow import Chute, InputError, curve, domain, flows, hot
 from chuteflow.branches.counting import flux_counts, most_at_once
 from chuteflow.maps import CODES, exists_at
-from chuteflow.maps.columns import Part, alike
-from chuteflow.maps.kinds import _monotonic_pieces, kinds
-from chuteflow.maps.plane import Axis, Plane, code
-from chuteflow.maps.zeros import extremes_on, zeros_on
+from chuteflow.maps.columns import PiecewiseConstant, alike
+from chuteflow.maps.kinds import _monotonic_pieces, classify_flows
+from chuteflow.maps.plane import ParameterAxis, ParameterPlane, classify
+from chuteflow.maps.zeros import bound_extremes, evaluate_zeros
 from chuteflow.steady.model import model
 from chuteflow.theory.hot import dilute, hot_parameters
 from chuteflow.theory.laws import law
-from chuteflow.trajectories.refining import carry_down
+from chuteflow.trajectories.refining import integrate_trajectories
 
 from .domain_points import compare, enumerated, random_planes
 
@@ -96,7 +96,7 @@ def test_what_deep_trajectories_show_by_interpolation_alone_is_no_kind(seed, slo
     plane, place = next(
         point for point in random_planes(seed) if point[0].chute_at(*point[1]).slope == pytest.approx(slope, rel=1e-12)
     )
-    assert code(plane, *place) == enumerated(plane.chute_at(*place))
+    assert classify(plane, *place) == enumerated(plane.chute_at(*place))
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_what_deep_trajectories_show_by_interpolation_alone_is_no_kind(seed, slo
 @pytest.mark.parametrize("seed", range(100, 110))
 def test_a_thousand_points_for_each_surface_are_classified_as_by_the_full_enumeration(surface, seed):
     _near, far, unknown = compare(seed, 100, 2e-3, surface)
-    # Where deep families are many, neither side is sure of their number.
+    # Where deep branches are many, neither side is sure of their number.
     assert len({chute for _, _, _, chute in far}) <= 3
     assert len(unknown) <= 3
 
@@ -115,10 +115,10 @@ def test_cells_are_those_of_their_centres(base_map):
     for _ in range(60):
         j, i = int(random.integers(len(base_map.y))), int(random.integers(len(base_map.x)))
         u, v = (i + 0.5) / len(base_map.x), (j + 0.5) / len(base_map.y)
-        found = code(plane, u, v)
+        found = classify(plane, u, v)
         said = (base_map.most[j, i], base_map.families[j, i])
         if said != found[:2]:
-            around = [code(plane, u + a * 0.01, v + b * 0.01)[:2] for a in (-1, 0, 1) for b in (-1, 0, 1)]
+            around = [classify(plane, u + a * 0.01, v + b * 0.01)[:2] for a in (-1, 0, 1) for b in (-1, 0, 1)]
             assert said in around
             wrong += 1
     assert wrong < 6
@@ -141,7 +141,7 @@ def test_boundaries_part_what_differs(base_map):
             beside = [(u + s * across[0], v + s * across[1]) for s in (-1.0, 1.0)]
             if not all(0.0 <= share <= 1.0 for point in beside for share in point):
                 continue
-            sides = [code(plane, *point)[number] for point in beside]
+            sides = [classify(plane, *point)[number] for point in beside]
             assert sides[0] != sides[1]
             checked += 1
     assert checked > 20
@@ -221,12 +221,12 @@ def test_a_fold_of_the_curve_is_where_the_number_of_flows_changes(base_map):
     for y in base_map.y[::4]:
         folds = [p for branch in curve(Chute(0.3, 0.8, wall, float(y))).branches for p in branch.special]
         counts.append(sum(point.kind == "fold-Q" for point in folds))
-    mapped = [code(base_map.plane, u, float((y - 0.5) / (base_map.plane.y.high - 0.5)))[0] for y in base_map.y[::4]]
+    mapped = [classify(base_map.plane, u, float((y - 0.5) / (base_map.plane.y.high - 0.5)))[0] for y in base_map.y[::4]]
     assert [count >= 2 for count in counts] == [most >= 3 for most in mapped]
 
 
 def test_bands_narrower_than_can_be_resolved_are_left_out():
-    left, right = Part((0.2, 0.2005, 0.6), (0, 1, 2, 1)), Part((0.21, 0.61), (0, 2, 1))
+    left, right = PiecewiseConstant((0.2, 0.2005, 0.6), (0, 1, 2, 1)), PiecewiseConstant((0.21, 0.61), (0, 2, 1))
     pair = alike(left, right, 1e-3)
     assert pair is not None
     assert pair[0].stops == pytest.approx((0.20025, 0.6))
@@ -254,7 +254,7 @@ def test_what_cannot_be_mapped_is_refused(changed, what):
 
 
 def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
-    # ln Q = s^3 - s/4 along a family, between whose points it rises throughout.
+    # ln Q = s^3 - s/4 along a branch, between whose points it rises throughout.
     s = np.array([-1.2, -0.8, -0.55, 0.55, 0.8, 1.2])
     log_q, rise = s**3 - 0.25 * s, 3.0 * s**2 - 0.25
     assert (np.diff(log_q) > 0.0).all()
@@ -274,37 +274,44 @@ def test_two_turns_of_the_flux_between_two_points_of_a_family_are_seen():
 )
 def test_scatter_of_deep_flows_makes_no_folds(slope, roughness, most):
     # In each, ln Q of neighbouring flows on the grid differs from a smooth line by more than its change.
-    plane = Plane(Axis("slope", 0.25, 0.45), Axis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ())
-    found = code(plane, (slope - 0.25) / 0.2, (roughness - 0.5) / 0.36)
+    plane = ParameterPlane(
+        ParameterAxis("slope", 0.25, 0.45), ParameterAxis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ()
+    )
+    found = classify(plane, (slope - 0.25) / 0.2, (roughness - 0.5) / 0.36)
     assert found[CODES.index("most")] == most
     solved = curve(Chute(slope, 0.8, 0.8, roughness), points=10)
     assert max(count.flows for count in flux_counts(solved)) == most
 
 
 def test_the_first_inverted_flow_is_where_the_density_at_its_base_first_rises():
-    plane = Plane(Axis("slope", 0.25, 0.45), Axis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ())
+    plane = ParameterPlane(
+        ParameterAxis("slope", 0.25, 0.45), ParameterAxis("roughness", 0.5, 0.86), Chute(0.3, 0.8, 0.8, 0.6), ()
+    )
     # By curves of 300 points it is at r = 0.76589.
-    mapped = [code(plane, 0.465, (r - 0.5) / 0.36)[CODES.index("inverted")] for r in (0.7654, 0.7664)]
+    mapped = [classify(plane, 0.465, (r - 0.5) / 0.36)[CODES.index("inverted")] for r in (0.7654, 0.7664)]
     assert mapped == [1, 0]
 
 
 def test_a_trajectory_that_runs_off_in_its_last_step_ends_no_map():
     chute = Chute(0.38750000000000007, 0.7901041666666666, 0.8, 0.6)
-    grid = carry_down(model(chute), 1e-3, 1e5, 30.0)
-    zeros = zeros_on(grid, extremes_on(grid))
+    grid = integrate_trajectories(model(chute), 1e-3, 1e5, 30.0)
+    zeros = evaluate_zeros(grid, bound_extremes(grid))
     assert np.isfinite([zeros.log_q, zeros.log_m, zeros.log_t, zeros.rise]).all()
 
 
 @pytest.mark.parametrize("surface", ["free", "interface"])
 def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface):
     """On a slope where saddle and centre coexist, so that trajectories wind."""
-    plane = Plane(
-        Axis("roughness", 0.5, 0.866), Axis("wall_restitution", 0.4, 0.95), Chute(0.4, 0.8, 0.8, 0.7, surface), ()
+    plane = ParameterPlane(
+        ParameterAxis("roughness", 0.5, 0.866),
+        ParameterAxis("wall_restitution", 0.4, 0.95),
+        Chute(0.4, 0.8, 0.8, 0.7, surface),
+        (),
     )
     for u, v in np.random.default_rng(3).uniform(size=(6, 2)):
-        grid = carry_down(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
-        alone = kinds(grid, extremes_on(grid), ())
-        assert code(plane, u, v)[:2] == (alone.most, alone.families)
+        grid = integrate_trajectories(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
+        alone = classify_flows(grid, bound_extremes(grid), ())
+        assert classify(plane, u, v)[:2] == (alone.most, alone.families)
 
 
 @pytest.mark.parametrize(
@@ -316,6 +323,6 @@ def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface
     ],
 )
 def test_deep_families_of_steep_chutes_are_those_that_are_solved(chute, expected):
-    plane = Plane(Axis("slope", 0.1, 0.6), Axis("roughness", 0.5, 0.866), chute, ())
-    found = code(plane, (chute.slope - 0.1) / 0.5, (chute.roughness - 0.5) / 0.366)
+    plane = ParameterPlane(ParameterAxis("slope", 0.1, 0.6), ParameterAxis("roughness", 0.5, 0.866), chute, ())
+    found = classify(plane, (chute.slope - 0.1) / 0.5, (chute.roughness - 0.5) / 0.366)
     assert found[:2] == expected

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from chuteflow.numerics.chebyshev import grid, interpolation_matrix, refinement, tail
+from chuteflow.numerics.chebyshev import grid, interpolation_matrix, piecewise_grid, refinement, tail
 
 
 @pytest.mark.parametrize("degree", [2, 5, 16, 37])
@@ -42,3 +42,25 @@ def test_refinement_and_tail():
 def test_a_degree_below_two_is_refused():
     with pytest.raises(ValueError, match="at least 2"):
         grid(1)
+
+
+def test_a_grid_in_pieces_is_exact_for_a_function_with_a_kink():
+    g = piecewise_grid((0.0, 0.25, 0.7, 1.0), 6)
+    rise, fall = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0]), np.polynomial.Polynomial([0.3, 1.0, 0.0, 0.0, -2.0])
+    fall = fall - fall(0.7) + rise(0.7)
+
+    def joined(left, right, s):
+        return np.where(s <= 0.7, left(s), right(s))
+
+    values = np.stack([joined(rise, fall, g.nodes), g.nodes])
+    whole = rise.integ(), fall.integ() - fall.integ()(0.7) + rise.integ()(0.7)
+    points = np.array([0.0, 0.1, 0.25, 0.69, 0.7, 0.71, 1.0])
+    np.testing.assert_allclose(g.interpolate(values, points), [joined(rise, fall, points), points], atol=1e-14)
+    np.testing.assert_allclose(g.integrate(values), [joined(*whole, g.nodes), 0.5 * g.nodes**2], atol=1e-14)
+    np.testing.assert_allclose(
+        g.differentiate(values), [joined(rise.deriv(), fall.deriv(), g.nodes), np.ones(g.degree + 1)], atol=1e-12
+    )
+    np.testing.assert_allclose(g.weights @ values[0], whole[1](1.0), atol=1e-14)
+    for matrix, method in ((g.integral, g.integrate), (g.derivative, g.differentiate)):
+        np.testing.assert_allclose(values @ matrix.T, method(values), atol=1e-12)
+    np.testing.assert_allclose(values @ interpolation_matrix(g, points).T, g.interpolate(values, points), atol=1e-14)

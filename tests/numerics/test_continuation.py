@@ -13,10 +13,10 @@ import pytest
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array, grid, refinement
 from chuteflow.numerics.continuation import (
-    Control,
+    ContinuationSettings,
+    ContinuationStatus,
+    CurvePoint,
     Located,
-    Point,
-    Status,
     System,
     Trace,
     closes,
@@ -164,11 +164,11 @@ def bratu_norm(middle: float) -> float:
     return float(np.sqrt(0.5 * GAUSS_WEIGHTS @ u**2))
 
 
-def bratu_points(system: Bratu, control: Control) -> list[Point[Bratu]]:
+def bratu_points(system: Bratu, control: ContinuationSettings) -> list[CurvePoint[Bratu]]:
     """From the trivial solution to well beyond the fold."""
     points = trace(system, system.start(), direction=np.eye(system.degree)[-1], control=control)
     kept = list(takewhile(lambda p: p.system.middle(p.z) < 4.0, points))
-    assert points.status is Status.RUNNING, points.status.value
+    assert points.status is ContinuationStatus.RUNNING, points.status.value
     return kept
 
 
@@ -182,15 +182,15 @@ class Problem:
     make: Callable[[], System]
     start: tuple[float, ...]
     direction: tuple[float, ...]
-    goes_on: Callable[[Point], bool]
+    goes_on: Callable[[CurvePoint], bool]
     folds: dict[int, list[tuple[float, ...]]] = field(default_factory=dict)
 
-    def follow(self, system: System, control: Control) -> list[Point]:
+    def follow(self, system: System, control: ContinuationSettings) -> list[CurvePoint]:
         """The points of the trace, and the first beyond its end."""
         return followed(trace(system, np.array(self.start), direction=np.array(self.direction), control=control), self)
 
 
-def followed(points: Trace, problem: Problem) -> list[Point]:
+def followed(points: Trace, problem: Problem) -> list[CurvePoint]:
     kept = []
     for point in points:
         kept.append(point)
@@ -230,11 +230,11 @@ def problem(request: pytest.FixtureRequest) -> Problem:
 
 
 @pytest.fixture(params=CHOICES)
-def control(request: pytest.FixtureRequest) -> Control:
-    return Control(parametrisation=request.param)
+def control(request: pytest.FixtureRequest) -> ContinuationSettings:
+    return ContinuationSettings(parametrisation=request.param)
 
 
-def located_folds(points: list[Point], component: int, control: Control) -> Iterator[Located]:
+def located_folds(points: list[CurvePoint], component: int, control: ContinuationSettings) -> Iterator[Located]:
     """The folds in a component, each between two points of a trace on one system."""
     for a, b in pairwise(points):
         monitor = fold_of(lambda z, system: np.eye(len(z))[component])
@@ -310,14 +310,14 @@ def test_tangents_are_unit_vectors_along_the_curve(problem, control):
 def test_successive_tangents_differ_by_less_than_the_largest_angle(problem):
     system = problem.make()
     for largest in (0.05, 0.2):
-        points = problem.follow(system, Control(max_angle=largest))
+        points = problem.follow(system, ContinuationSettings(max_angle=largest))
         cosines = [inner(system, a.tangent, b.tangent) for a, b in pairwise(points)]
         assert min(cosines) > np.cos(largest) - 1e-12
         assert min(cosines) < np.cos(0.5 * largest)
 
 
 def test_steps_stay_within_their_bounds():
-    points = PROBLEMS["cubic"].follow(cubic(), Control(initial_step=0.04, min_step=0.038, max_step=0.05))
+    points = PROBLEMS["cubic"].follow(cubic(), ContinuationSettings(initial_step=0.04, min_step=0.038, max_step=0.05))
     steps = [point.step for point in points[1:]]
     assert points[0].step == 0.0
     assert steps[0] == 0.04
@@ -378,7 +378,7 @@ def test_a_component_is_held_that_does_not_near_its_fold():
     system = circle()
     tried = recorded(system)
     held = 0
-    control = Control(max_step=0.1, max_points=62)
+    control = ContinuationSettings(max_step=0.1, max_points=62)
     for point in trace(system, np.array([1.0, 0.0]), direction=np.array([0.0, 1.0]), control=control):
         quarter, angle = divmod(point.arclength, np.pi / 2)
         # Up to the middle of the first quarter y changes more than x, but ever less.
@@ -393,7 +393,7 @@ def test_corrections_are_normal_to_the_tangent_in_the_inner_product():
     system = ellipse()
     tried = recorded(system)
     tangent = None
-    control = Control(max_step=0.1, max_points=30, parametrisation="arclength")
+    control = ContinuationSettings(max_step=0.1, max_points=30, parametrisation="arclength")
     for point in trace(system, np.array([2.0, 0.0]), direction=np.array([0.0, 1.0]), control=control):
         correction = point.z - tried[0]
         if tangent is not None:
@@ -420,7 +420,7 @@ def test_arclength_converges_with_the_fourth_power_of_the_step():
     for step in (0.2, 0.1):
         system = ellipse()
         system.weights = np.ones(2)
-        control = Control(initial_step=step, max_step=step, max_angle=1.0)
+        control = ContinuationSettings(initial_step=step, max_step=step, max_angle=1.0)
         points = trace(system, np.array([2.0, 0.0]), direction=np.array([0.0, 1.0]), control=control)
         kept = list(takewhile(lambda p: p.arclength < 10.5, points))
         closing = [located for located in located_folds(kept, 0, control) if located.point.z[0] > 0.0]
@@ -447,7 +447,11 @@ def test_neither_the_resolution_nor_the_step_moves_the_path(control):
 def test_without_quadrature_weights_the_resolution_does_move_the_path():
     lengths = []
     for degree in (16, 24):
-        (fold,) = located_folds(bratu_points(Bratu(degree, quadrature=False), Control(max_step=0.1)), -1, Control())
+        (fold,) = located_folds(
+            bratu_points(Bratu(degree, quadrature=False), ContinuationSettings(max_step=0.1)),
+            -1,
+            ContinuationSettings(),
+        )
         lengths.append(fold.point.arclength)
     assert np.ptp(lengths) > 0.1
 
@@ -469,7 +473,7 @@ def test_folds_are_located_within_their_error(problem, control):
         assert len(located) == len(folds)
         assert system.calls - before < 40 * len(folds)
         for found, exact in zip(located, folds, strict=True):
-            assert found.status is Status.LOCATED
+            assert found.status is ContinuationStatus.LOCATED
             assert abs(found.value) < 1e-12
             # Honest, but for the rounding of the exact point, and close to round-off.
             assert distance(system, found.point.z, exact) <= found.error + 4e-16 * np.abs(exact).max()
@@ -486,7 +490,7 @@ def test_the_fold_of_bratu(control):
 def test_the_parametrisations_agree(problem):
     found = []
     for choice in CHOICES:
-        control = Control(parametrisation=choice, max_step=0.5, max_angle=0.1)
+        control = ContinuationSettings(parametrisation=choice, max_step=0.5, max_angle=0.1)
         points = problem.follow(problem.make(), control)
         found.append([f.point for component in problem.folds for f in located_folds(points, component, control)])
     for local, arclength in zip(*found, strict=True):
@@ -517,7 +521,7 @@ def test_equal_steps_back_pass_through_the_same_points(control):
     last = there[-1]
     points = trace(circle(), last.z, direction=-last.tangent, control=replace(equal, max_points=len(there)))
     back = list(points)
-    assert points.status is Status.MAX_POINTS
+    assert points.status is ContinuationStatus.MAX_POINTS
     np.testing.assert_allclose([p.z for p in back[::-1]], [p.z for p in there], atol=0.05 * 0.05)
 
 
@@ -551,13 +555,13 @@ def test_locate_says_why_it_stopped(control):
     a, b = fold_of_the_cubic(control)
     hole = planar(lambda x, y: np.nan if a.z[0] < x < b.z[0] else 0.0, lambda x, y: 3.0 - 3.0 * x * x, lambda x, y: 1.0)
     found = locate(a, b, hole, fold_of(lambda z, system: np.array([0.0, 1.0])), control=control)
-    assert found.status is Status.LEFT_DOMAIN
+    assert found.status is ContinuationStatus.LEFT_DOMAIN
     assert found.status.failed
     assert found.point is a or found.point is b
     assert found.error >= b.arclength - a.arclength
 
 
-def fold_of_the_cubic(control: Control) -> tuple[Point[Equation], Point[Equation]]:
+def fold_of_the_cubic(control: ContinuationSettings) -> tuple[CurvePoint[Equation], CurvePoint[Equation]]:
     """Two successive points around (-1, 2)."""
     points = PROBLEMS["cubic"].follow(cubic(), control)
     return next((a, b) for a, b in pairwise(points) if a.tangent[1] * b.tangent[1] < 0.0)
@@ -595,7 +599,7 @@ def test_a_monitor_far_from_linear_is_located_as_well(function, control):
         return float(function(z[0] + 1.0 + 1e-16))
 
     found = locate(a, b, a.system, monitor, control=control)
-    assert found.status is Status.LOCATED
+    assert found.status is ContinuationStatus.LOCATED
     assert abs(found.point.z[0] + 1.0) < 1e-14
     # Bisection would take 48.
     assert calls < 52
@@ -603,21 +607,21 @@ def test_a_monitor_far_from_linear_is_located_as_well(function, control):
 
 def test_locations_do_not_hang_on_the_number_of_iterations():
     problem = PROBLEMS["Freudenstein-Roth"]
-    few = Control(max_iterations=3)
+    few = ContinuationSettings(max_iterations=3)
     for found in located_folds(problem.follow(freudenstein_roth(), few), 2, few):
-        assert found.status is Status.LOCATED
+        assert found.status is ContinuationStatus.LOCATED
         assert found.error < 1e-11
 
 
 def test_a_monitor_that_is_not_a_number_is_told(control):
     a, b = fold_of_the_cubic(control)
     found = locate(a, b, a.system, lambda z, t, system: t[1] if z is a.z or z is b.z else np.nan, control=control)
-    assert found.status is Status.LEFT_DOMAIN
+    assert found.status is ContinuationStatus.LEFT_DOMAIN
     assert np.isfinite(found.value)
 
 
 def test_locate_refuses_what_it_cannot_bracket():
-    points = PROBLEMS["circle"].follow(circle(), Control())
+    points = PROBLEMS["circle"].follow(circle(), ContinuationSettings())
     a, b, *_, opposite, last = points
     with pytest.raises(InputError, match="change its sign"):
         locate(a, b, a.system, lambda z, t, system: 1.0)
@@ -633,7 +637,7 @@ def test_locate_refuses_what_it_cannot_bracket():
 
 @pytest.mark.parametrize("end", [0, 1])
 def test_a_zero_at_an_end_is_found(end):
-    a, b = PROBLEMS["circle"].follow(circle(), Control())[4:6]
+    a, b = PROBLEMS["circle"].follow(circle(), ContinuationSettings())[4:6]
     zero = (a, b)[end]
     found = locate(a, b, a.system, lambda z, t, system: float(z[0] - zero.z[0]))
     assert distance(a.system, found.point.z, zero.z) <= found.error < 1e-13
@@ -645,14 +649,14 @@ def test_a_fold_just_beyond_an_end_is_found(end, offset, control):
     # The tangent of one end is so rough that its fold seems to be on the other side of it.
     here = np.pi / 2 + np.array([[offset, 0.1], [-0.1, -offset]])[end]
     a, b = (
-        Point(np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)]), t, 0.1, 2, 0.0, circle())
+        CurvePoint(np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)]), t, 0.1, 2, 0.0, circle())
         for t in here
     )
     rough = here[end] + np.array([-2.0, 2.0])[end] * offset
     tangent = np.array([-np.sin(rough), np.cos(rough)])
     a, b = (replace(a, tangent=tangent), b) if end == 0 else (a, replace(b, tangent=tangent))
     found = locate(a, b, a.system, fold_of(lambda z, system: np.array([0.0, 1.0])), control=control)
-    assert found.status is Status.LOCATED
+    assert found.status is ContinuationStatus.LOCATED
     assert distance(a.system, found.point.z, np.array([0.0, 1.0])) <= found.error < 1e-13
     assert found.point.arclength == pytest.approx(np.pi / 2, abs=offset)
 
@@ -683,7 +687,7 @@ def test_a_closed_curve_is_seen_to_close_once_around(name, control):
 
 def test_a_segment_that_ends_at_the_start_closes():
     equal = 2.0 * np.pi / 60
-    control = Control(initial_step=equal, max_step=equal, parametrisation="arclength")
+    control = ContinuationSettings(initial_step=equal, max_step=equal, parametrisation="arclength")
     points = PROBLEMS["circle"].follow(circle(), control)
     before, start = points[58], points[0]
     assert closes(start, before, replace(start, arclength=2.0 * np.pi))
@@ -695,7 +699,7 @@ def test_other_passages_do_not_close():
     )
     start = points[0]
 
-    def seen(as_start: Point) -> bool:
+    def seen(as_start: CurvePoint) -> bool:
         return any(closes(as_start, a, b) for a, b in pairwise(points))
 
     assert seen(start)
@@ -707,7 +711,7 @@ def test_other_passages_do_not_close():
 
 
 def test_an_open_curve_does_not_close():
-    points = PROBLEMS["cubic"].follow(cubic(), Control())
+    points = PROBLEMS["cubic"].follow(cubic(), ContinuationSettings())
     assert not any(closes(points[0], a, b) for a, b in pairwise(points))
 
 
@@ -740,7 +744,7 @@ def test_a_system_that_always_asks_for_a_change_gets_one_between_steps():
             return Restless(self.degree), z, tangent
 
     system = Restless(12)
-    points = list(trace(system, system.start(), direction=np.eye(12)[-1], control=Control(max_points=21)))
+    points = list(trace(system, system.start(), direction=np.eye(12)[-1], control=ContinuationSettings(max_points=21)))
     assert [point.step > 0.0 for point in points[1:]] == 10 * [False, True]
     assert len({id(point.system) for point in points}) == 11
 
@@ -749,7 +753,7 @@ def test_a_point_carried_over_badly_ends_the_trace():
     system = Spoilt(12)
     points = trace(system, system.start(), direction=np.eye(12)[-1])
     assert Spoilt(12).middle([*points][-1].z) >= 2.0
-    assert points.status is Status.ADAPTATION_FAILED
+    assert points.status is ContinuationStatus.ADAPTATION_FAILED
 
 
 def test_what_is_carried_over_must_fit():
@@ -797,7 +801,7 @@ def test_a_curve_that_ends_is_followed_to_its_end(f, derivative, evaluations, co
     system = curve(f, derivative)
     points = trace(system, np.array([0.0, 1.0]), direction=np.array([1.0, 0.0]), control=control)
     last = list(points)[-1]
-    assert points.status is Status.LEFT_DOMAIN
+    assert points.status is ContinuationStatus.LEFT_DOMAIN
     assert points.status.failed
     # The square root makes 1e-5 of the tolerance of 1e-10.
     np.testing.assert_allclose(last.z, [1.0, 0.0], atol=1e-5)
@@ -809,7 +813,7 @@ def test_a_corner_is_not_turned(control):
     bent = curve(lambda x: max(-0.2 * x, 0.6 * x), lambda x: 0.6 if x > 0.0 else -0.2)
     points = trace(bent, np.array([-1.0, 0.2]), direction=np.array([1.0, 0.0]), control=control)
     last = list(points)[-1]
-    assert points.status is Status.SHARP_TURN
+    assert points.status is ContinuationStatus.SHARP_TURN
     np.testing.assert_allclose(last.z, [0.0, 0.0], atol=1e-7)
 
 
@@ -818,7 +822,7 @@ def test_a_wrong_jacobian_is_told():
     points = trace(system, np.array([1.0, 1.0]), direction=np.array([1.0, 0.0]))
     tried = recorded(system)
     assert len(list(points)) == 1
-    assert points.status is Status.NOT_CONVERGED
+    assert points.status is ContinuationStatus.NOT_CONVERGED
     assert min(np.linalg.norm(z - tried[0]) for z in tried[1:]) == pytest.approx(1e-8, rel=1e-6)
     # A try is given up as soon as corrections grow; there are 21 from a step of 0.01 to one of 1e-8.
     assert system.calls == 1 + 2 * 21
@@ -828,7 +832,7 @@ def test_a_singular_system_is_told(control):
     system = planar(lambda x, y: y, lambda x, y: 0.0, lambda x, y: float(x < 1.0))
     points = trace(system, np.zeros(2), direction=np.array([1.0, 0.0]), control=control)
     assert list(points)[-1].z[0] == pytest.approx(1.0, abs=1e-6)
-    assert points.status is Status.SINGULAR
+    assert points.status is ContinuationStatus.SINGULAR
 
 
 @pytest.mark.parametrize(
@@ -847,21 +851,23 @@ def test_a_singular_system_is_told(control):
 def test_a_start_that_leads_nowhere_is_told(system, start, direction):
     points = trace(system, np.array(start), direction=np.array(direction))
     assert list(points) == []
-    assert points.status is Status.START_FAILED
+    assert points.status is ContinuationStatus.START_FAILED
 
 
 def test_max_points_ends_a_trace_that_can_be_taken_up_again():
-    first = trace(circle(), np.array([1.0, 0.0]), direction=np.array([0.0, 1.0]), control=Control(max_points=5))
+    first = trace(
+        circle(), np.array([1.0, 0.0]), direction=np.array([0.0, 1.0]), control=ContinuationSettings(max_points=5)
+    )
     points = list(first)
     assert len(points) == 5
-    assert first.status is Status.MAX_POINTS
+    assert first.status is ContinuationStatus.MAX_POINTS
     assert not first.status.failed
     again = trace(circle(), points[-1].z, direction=points[-1].tangent)
     np.testing.assert_allclose(next(again).z, points[-1].z, atol=1e-12)
     assert inner(circle(), next(again).z - points[-1].z, points[-1].tangent) > 0.0
 
 
-@pytest.mark.parametrize("status", Status)
+@pytest.mark.parametrize("status", ContinuationStatus)
 def test_every_status_is_a_sentence(status):
     assert status.value[0].isupper()
     assert status.value.endswith(".")
@@ -886,7 +892,7 @@ def test_every_status_is_a_sentence(status):
 )
 def test_a_control_out_of_range_is_refused(name, value):
     with pytest.raises(InputError, match=f"^{name} is {value!r}: it must be "):
-        Control(**{name: value})
+        ContinuationSettings(**{name: value})
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chuteflow.numerics.chebyshev import grid
-from chuteflow.numerics.eigenproblem import Inverse, arnoldi, drift, refined, spectrum
+from chuteflow.numerics.eigenproblem import Inverse, arnoldi, drift, refine_eigenvalue, spectrum
 
 # Orszag 1971, J. Fluid Mech. 50: plane Poiseuille flow at Re = 10,000, alpha = 1.
 ORSZAG = 0.23752649 + 0.00373967j
@@ -72,7 +72,7 @@ def test_arnoldi_ends_early_in_an_invariant_space():
 def test_refinement_from_a_neighbour():
     near = spectrum(*orr_sommerfeld(50), shift=0.25 + 0.01j).values[0]
     a, weights = orr_sommerfeld(70)
-    value, vector = refined(a, weights, near)
+    value, vector = refine_eigenvalue(a, weights, near)
     assert abs(value - ORSZAG) < 1e-7
     residual = a @ vector - value * weights * vector
     assert np.abs(residual).max() < 1e-8 * np.abs(a).max()

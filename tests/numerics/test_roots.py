@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from chuteflow.numerics.roots import bisected, itp_trial, secants, zeros
+from chuteflow.numerics.roots import bisect, find_zeros, itp_trial, secants
 
 #: Rising functions on a bracket, with their roots; flat, steep and lopsided ones among them.
 FUNCTIONS = {
@@ -18,7 +18,7 @@ FUNCTIONS = {
 
 @pytest.mark.parametrize(("function", "low", "high", "root"), FUNCTIONS.values(), ids=FUNCTIONS)
 def test_bisection_leaves_no_number_between(function, low, high, root):
-    found = bisected(function, low, high)
+    found = bisect(function, low, high)
     assert found == pytest.approx(root, rel=1e-14)
     assert function(np.nextafter(found, -np.inf)) <= 0.0 <= function(np.nextafter(found, np.inf))
 
@@ -50,7 +50,7 @@ def test_many_roots_at_once_are_those_found_one_by_one():
         return x**3 - targets[which]
 
     indices = np.arange(300)
-    found = zeros(function, low, high, function(indices, low), function(indices, high), 1e-13, 0.0)
+    found = find_zeros(function, low, high, function(indices, low), function(indices, high), 1e-13, 0.0)
     np.testing.assert_allclose(found, np.cbrt(targets), rtol=1e-12)
 
 
@@ -59,6 +59,6 @@ def test_a_function_that_is_not_finite_has_no_root():
         return np.where(which == 1, np.nan, x - 0.25)
 
     ends = np.zeros(3), np.ones(3)
-    found = zeros(function, *ends, np.full(3, -0.25), np.full(3, 0.75), 1e-12, 0.0)
+    found = find_zeros(function, *ends, np.full(3, -0.25), np.full(3, 0.75), 1e-12, 0.0)
     assert np.isnan(found[1])
     np.testing.assert_allclose(found[[0, 2]], 0.25)

@@ -14,7 +14,7 @@ from chuteflow.errors import InputError
 from chuteflow.paper.claims import (
     CLAIMS,
     VERDICTS,
-    Verdict,
+    ClaimResult,
     check,
     domains,
     far_field,
@@ -89,7 +89,7 @@ NUMBERS = {
 
 
 @pytest.fixture(scope="module")
-def timed() -> dict[str, tuple[Verdict, float]]:
+def timed() -> dict[str, tuple[ClaimResult, float]]:
     """All of them, computed once, with the processor time that each took."""
     found, begin = {}, time.process_time()
     for verdict in check():
@@ -99,7 +99,7 @@ def timed() -> dict[str, tuple[Verdict, float]]:
 
 
 @pytest.fixture(scope="module")
-def verdicts(timed) -> dict[str, Verdict]:
+def verdicts(timed) -> dict[str, ClaimResult]:
     return {id: verdict for id, (verdict, _) in timed.items()}
 
 
@@ -149,7 +149,7 @@ def expected_verdict(id: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("id", CLAIMS)
-def test_verdict(verdicts, id):
+def test_result(verdicts, id):
     found = verdicts[id]
     assert found.verdict == expected_verdict(id), found
     assert found.verdict in VERDICTS
@@ -178,7 +178,7 @@ def test_number(verdicts, place, expected):
     assert (computed if name is None else computed[name]) == pytest.approx(expected, rel=3e-4)
 
 
-def test_verdicts_cannot_be_changed():
+def test_results_cannot_be_changed():
     found: Any = CLAIMS["flow-a"].check()
     with pytest.raises(FrozenInstanceError):
         found.verdict = "corrected"

@@ -18,7 +18,16 @@ from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
-from chuteflow.paper.sources import NOT_REACHED, OVERBURDEN, Mapped, MappedCurves, Source, Unreached, reach, source
+from chuteflow.paper.sources import (
+    NOT_REACHED,
+    OVERBURDEN,
+    Mapped,
+    MappedCurves,
+    Source,
+    UnreachedBranch,
+    reach,
+    source,
+)
 from chuteflow.steady.collocation import LOG_M, LOG_T
 from chuteflow.steady.mapped.curve import TOLERANCE, MappedCurve
 from chuteflow.steady.mapped.solution import MappedSolution
@@ -125,7 +134,7 @@ def agreeing(found: MappedCurves) -> int:
 
 def beside(branch: MappedCurve, theirs: Curve) -> Iterator[tuple[MappedSolution, Any]]:
     """Every flow of ``branch``, and that of the overburden method in the same plane across the curve."""
-    known = [flow for family in theirs.branches for flow in family.flows]
+    known = [flow for branch in theirs.branches for flow in branch.flows]
     places = np.array([flow.solution.macroscopic for flow in known])
     line: list[Any] = [point.flow for point in in_order(branch)]
     along = np.gradient(np.array([flow.macroscopic[LOG_M:] for flow in line]), axis=0)
@@ -155,7 +164,7 @@ UNRESOLVED = "the series are not resolved with N = 400"
 
 @pytest.fixture(scope="module")
 def cut_short() -> MappedCurves:
-    """A family that is known from the surface temperature 2 on, of all from 0.5 on."""
+    """A branch that is known from the surface temperature 2 on, of all from 0.5 on."""
     (found,) = Mapped().curves([dissipative(0.3)], (2.0, 4.0))
     (branch,) = found.branches
     return replace(
@@ -167,20 +176,20 @@ def test_where_the_mapped_method_ends_is_said(cut_short):
     (branch,) = cut_short.branches
     coldest = branch.surface_temperature.min()
     (note,) = reach(cut_short)
-    assert note == f"{NOT_REACHED}: what lies beyond the surface temperature {coldest:g} on a family: {UNRESOLVED}"
+    assert note == f"{NOT_REACHED}: what lies beyond the surface temperature {coldest:g} on a branch: {UNRESOLVED}"
     assert f"# {note}" in csv_text(Curves("Title", "slope", {0.3: cut_short})).splitlines()
 
 
 def test_a_family_out_of_reach_is_said(cut_short):
-    lost = replace(cut_short, branches=(), unreached=(Unreached((0.001, 0.005), "no series converges"),))
+    lost = replace(cut_short, branches=(), unreached=(UnreachedBranch((0.001, 0.005), "no series converges"),))
     assert reach(lost) == [
-        f"{NOT_REACHED}: a family with surface temperatures from 0.001 to 0.005: no series converges"
+        f"{NOT_REACHED}: a branch with surface temperatures from 0.001 to 0.005: no series converges"
     ]
 
 
 @pytest.mark.slow
 def test_cold_flows_on_steep_slopes_are_out_of_reach():
-    """At 0.36 they are deep in units of T_inf; the second family of 0.34 is colder than 0.006."""
+    """At 0.36 they are deep in units of T_inf; the second branch of 0.34 is colder than 0.006."""
     steep, thin = (
         Mapped().curves([dissipative(s)], ends)[0] for s, ends in ((0.36, (0.3, 2.0)), (0.34, (1.5e-3, 5e-3)))
     )
@@ -191,7 +200,7 @@ def test_cold_flows_on_steep_slopes_are_out_of_reach():
     assert thin.branches == ()
     assert thin.unreached
     assert all(
-        note.startswith(f"{NOT_REACHED}: a family with surface temperatures from 0.0015") for note in reach(thin)
+        note.startswith(f"{NOT_REACHED}: a branch with surface temperatures from 0.0015") for note in reach(thin)
     )
 
 

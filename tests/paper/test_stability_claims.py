@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from chuteflow.paper.claims import CLAIMS, stability
-from chuteflow.stability.budget import Budget, Term
+from chuteflow.stability.budget import ModeBudget, Term
 
 IDS = ("three-unstable-modes", "stable-in-a-small-part", "inversion-and-stability")
 
@@ -14,24 +14,24 @@ IDS = ("three-unstable-modes", "stable-in-a-small-part", "inversion-and-stabilit
 def known(monkeypatch):
     """Judged flows as the claims find them, by kind and density, without computing them."""
 
-    def judged(kind, density):
+    def examined(kind, density):
         mode = SimpleNamespace(direction=kind, growth=0.01, kx=0.1, ky=0.0)
         flow = SimpleNamespace(density=density, centre_of_mass=2.0)
         return flow, SimpleNamespace(stable=kind == "stable", mode=mode, flow=flow)
 
     table = {
-        "T_inf = 20": judged("across", "monotonic"),
-        "flow A": judged("across", "monotonic"),
-        "T_inf = 1.7": judged("stable", "monotonic"),
-        "T_inf = 1.2": judged("stable", "inverted"),
-        "flow C": judged("along", "inverted"),
+        "T_inf = 20": examined("across", "monotonic"),
+        "flow A": examined("across", "monotonic"),
+        "T_inf = 1.7": examined("stable", "monotonic"),
+        "T_inf = 1.2": examined("stable", "inverted"),
+        "flow C": examined("along", "inverted"),
     }
-    monkeypatch.setattr(stability, "_judged", lambda: table)
-    monkeypatch.setattr(stability, "_steep", lambda: judged("oblique", "inverted")[1])
-    return table, judged
+    monkeypatch.setattr(stability, "_stability_of_flows", lambda: table)
+    monkeypatch.setattr(stability, "_steep", lambda: examined("oblique", "inverted")[1])
+    return table, examined
 
 
-def test_verdicts_follow_from_the_flows(known):
+def test_results_follow_from_the_flows(known):
     assert [CLAIMS[id].check().verdict for id in IDS] == ["confirmed"] * 3
 
 
@@ -44,8 +44,8 @@ def test_verdicts_follow_from_the_flows(known):
     ],
 )
 def test_other_flows_change_a_verdict(known, id, name, kind, density):
-    table, judged = known
-    table[name] = judged(kind, density)
+    table, examined = known
+    table[name] = examined(kind, density)
     assert CLAIMS[id].check().verdict == "not confirmed"
 
 
@@ -53,7 +53,7 @@ def budget(loss, shear, closure=1e-9):
     """A budget with what the loss feeds in all, and the shear."""
     parts = ("collisional loss by density", 3.0 * loss), ("collisional loss by temperature", -2.0 * loss)
     terms = tuple(Term(name, thermal=rate) for name, rate in (*parts, ("shear production", shear)))
-    return Budget(SimpleNamespace(growth=0.01, direction="along"), terms, (0.3, 0.4, 0.3), closure)  # pyright: ignore[reportArgumentType]
+    return ModeBudget(SimpleNamespace(growth=0.01, direction="along"), terms, (0.3, 0.4, 0.3), closure)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

@@ -203,12 +203,12 @@ def family_map(within, points=40):
 def test_ticks_along_a_family_are_round_temperatures_in_their_places(within):
     found = family_map(within)
     axes = plot_family_map(found).axes[0]
-    warmth = [flow.surface_temperature for flow in found.flows]
+    log_temperature = [flow.surface_temperature for flow in found.flows]
     places, said = axes.get_yticks(), [label.get_text() for label in axes.get_yticklabels()]
     assert 3 <= len(said) <= 13
     for place, text in zip(places, said, strict=True):
         assert re.fullmatch(r"0\.0*[1-9]|[1-9]0*|[1-9]e[+-]\d+", text)
-        at = np.interp(place, np.linspace(0.0, 1.0, len(warmth)), np.log(warmth))
+        at = np.interp(place, np.linspace(0.0, 1.0, len(log_temperature)), np.log(log_temperature))
         assert np.exp(at) == pytest.approx(float(text), rel=1e-6)
     assert np.diff(np.sort(places)).min() >= 0.08
 

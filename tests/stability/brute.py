@@ -18,23 +18,23 @@ from chuteflow.numerics.eigenproblem import Inverse
 from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import Operator, operator
 from chuteflow.stability.modes import Disturbances
-from chuteflow.stability.verdict import leading, wavenumbers
+from chuteflow.stability.result import leading, wavenumbers
 
 #: Degrees of the grid of the map, tried in turn; relative difference of rates from those of the search that will do.
 DEGREES, ALIKE = (20, 26, 32), 0.02
-#: Points beyond the best that are checked: the map's grid may be wrong by this share.
+#: Points beyond the best that are checked: the map's grid may be wrong by this fraction.
 MARGIN = 0.05
 MOST_CHECKED = 400
 
 
 @dataclass(frozen=True)
 class Peak:
-    """The highest point of a map, the summit near by, and how many points could not be told."""
+    """The highest point of a map, the maximum near by, and how many points could not be resolved."""
 
     growth: float
     kx: float
     ky: float
-    summit: float
+    maximum: float
     summit_kx: float
     summit_ky: float
     degree: int
@@ -69,8 +69,8 @@ def highest(flow: chuteflow.Flow, points: int = 60, directions: int = 60) -> Pea
             best, place = found[0].growth, (float(logs[i]), float(angles[j]))
     if place is None:
         return None
-    summit, at = _climbed(disturbances, place, (logs[0], logs[-1]), max(logs[1] - logs[0], angles[1]))
-    return Peak(best, *_wave(*place), summit, *_wave(*at), degree, told, unresolved)
+    maximum, at = _maximised(disturbances, place, (logs[0], logs[-1]), max(logs[1] - logs[0], angles[1]))
+    return Peak(best, *_wave(*place), maximum, *_wave(*at), degree, told, unresolved)
 
 
 def _wave(log_k: float, angle: float) -> tuple[float, float]:
@@ -114,7 +114,7 @@ def _degree(disturbances: Disturbances, logs: np.ndarray) -> int:
     return DEGREES[-1]
 
 
-def _climbed(
+def _maximised(
     disturbances: Disturbances, place: tuple[float, float], ends: tuple[float, float], step: float
 ) -> tuple[float, tuple[float, float]]:
     def within(x: np.ndarray) -> tuple[float, float]:
@@ -165,8 +165,8 @@ def campaign(random: int, corner: int, seed: int = 12) -> Iterator[tuple[tuple[f
                 if kind == "random"
                 else ((0.5, 0.58, 0.4, 0.78, 0.7), (0.6, 0.7, 0.55, 0.866, 1.2))
             )
-            slope, e, ew, roughness, warmth = (round(float(x), 3) for x in rng.uniform(low, high))
-            found = chuteflow.flows(chuteflow.Chute(slope, e, ew, roughness), T_surface=10.0**warmth)
+            slope, e, ew, roughness, log_temperature = (round(float(x), 3) for x in rng.uniform(low, high))
+            found = chuteflow.flows(chuteflow.Chute(slope, e, ew, roughness), T_surface=10.0**log_temperature)
             if len(found):
                 left[kind] -= 1
                 yield (slope, e, ew, roughness), found[int(rng.integers(len(found)))]

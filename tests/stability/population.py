@@ -6,8 +6,8 @@ import numpy as np
 
 import chuteflow
 from chuteflow.numerics.chebyshev import grid
-from chuteflow.numerics.eigenproblem import refined
-from chuteflow.stability.base import Base, Resolution
+from chuteflow.numerics.eigenproblem import refine_eigenvalue
+from chuteflow.stability.base import BaseState, Resolution
 from chuteflow.stability.linear import operator
 from chuteflow.stability.modes import Mode
 
@@ -29,7 +29,7 @@ def random_flows(seed: int, count: int) -> Iterator[chuteflow.Flow]:
             yield flows[int(rng.integers(len(flows)))]
 
 
-def rational_base(flow: chuteflow.Flow, degree: int, reach: float, crowding: float) -> Base:
+def rational_base(flow: chuteflow.Flow, degree: int, reach: float, crowding: float) -> BaseState:
     """The flow with ln m = -L (1 - s)/(1 + c s), a map of another kind than those of the modes."""
     g = grid(degree)
     below = 1.0 + crowding * g.nodes
@@ -37,10 +37,12 @@ def rational_base(flow: chuteflow.Flow, degree: int, reach: float, crowding: flo
     profile = flow.at_overburden(share)
     rate = share * reach * (1.0 + crowding) / below**2  # dm/ds
     fall = profile.volume_fraction / (flow.mass_holdup * rate)
-    return Base(flow, Resolution(degree, reach, 0.0), share, profile, -fall[:, None] * g.derivative, g.weights / fall)
+    return BaseState(
+        flow, Resolution(degree, reach, 0.0), share, profile, -fall[:, None] * g.derivative, g.weights / fall
+    )
 
 
 def seen_again(mode: Mode, degree: int = 90, crowding: float = 2.0) -> float:
     """Change of the rate of ``mode`` on the other map."""
     other = operator(rational_base(mode.flow, degree, mode.operator.base.resolution.reach + 1.0, crowding))
-    return abs(refined(other.matrix(mode.kx, mode.ky), other.weights, mode.sigma)[0] - mode.sigma)
+    return abs(refine_eigenvalue(other.matrix(mode.kx, mode.ky), other.weights, mode.sigma)[0] - mode.sigma)

@@ -9,7 +9,7 @@ import pytest
 import chuteflow
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability import along
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 
 PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 
@@ -23,7 +23,7 @@ def verdict(flow, unknown_below=0.0):
     """Stable for surface temperatures from 1 to 2; unstable across above, along below."""
     T = flow.surface_temperature
     if unknown_below > T:
-        raise SolveError("the finest grids do not tell")
+        raise SolveError("the finest grids do not resolve it")
     mode = SimpleNamespace(direction="across" if T > 1.5 else "along", growth=0.01)
     return SimpleNamespace(stable=1.0 < T < 2.0, mode=mode)
 
@@ -31,7 +31,7 @@ def verdict(flow, unknown_below=0.0):
 def test_changes_are_located_between_samples_and_stand_among_the_special_points(curve, monkeypatch):
     monkeypatch.setattr(along, "stability_of", verdict)
     shares = []
-    found = along.marked(curve, samples=12, progress=shares.append)
+    found = along.mark_stability(curve, samples=12, progress=shares.append)
     (branch,) = found.branches
     changes = [point for point in found.curve.branches[0].special if point.kind == "stability-change"]
     # to 1/128 of the gap between two samples
@@ -51,7 +51,7 @@ def test_changes_are_located_between_samples_and_stand_among_the_special_points(
 
 def test_what_is_not_known_is_said(curve, monkeypatch):
     monkeypatch.setattr(along, "stability_of", lambda flow: verdict(flow, unknown_below=0.3))
-    (branch,) = along.marked(curve, samples=12).branches
+    (branch,) = along.mark_stability(curve, samples=12).branches
     assert [run.label for run in branch.runs] == ["across", "stable", "along", "unknown"]
     assert sum(point.kind == along.CHANGE for point in branch.branch.special) == 2
 
@@ -59,7 +59,7 @@ def test_what_is_not_known_is_said(curve, monkeypatch):
 def test_a_verdict_that_is_not_given_is_not_known(curve, monkeypatch):
     mode = SimpleNamespace(direction="along")
     monkeypatch.setattr(along, "stability_of", lambda flow: SimpleNamespace(stable=None, mode=mode))
-    (branch,) = along.marked(curve, samples=3).branches
+    (branch,) = along.mark_stability(curve, samples=3).branches
     assert [run.label for run in branch.runs] == ["unknown"]
     assert branch.changes == ()
 
@@ -68,12 +68,12 @@ def test_samples_out_of_range_and_surfaces_that_cannot_be_posed_are_refused(curv
     refused: list[Any] = [1, "20", 2.5]
     for samples in refused:
         with pytest.raises(InputError, match=r"samples = .*must be"):
-            along.marked(curve, samples=samples)
+            along.mark_stability(curve, samples=samples)
     interface = chuteflow.curve(
         chuteflow.Chute(0.3, 0.8, 0.8, 0.6, surface="interface"), points=8, surface_temperature=(1.0, 5.0)
     )
     with pytest.raises(InputError, match="free surface"):
-        along.marked(interface, samples=2)
+        along.mark_stability(interface, samples=2)
 
 
 def test_a_flow_between_two_of_a_family_is_a_flow_of_it(curve):
@@ -87,7 +87,7 @@ def test_a_flow_between_two_of_a_family_is_a_flow_of_it(curve):
 
 @pytest.mark.slow
 def test_the_family_of_the_paper_is_stable_in_its_middle_alone(curve):
-    found = along.marked(curve, samples=12)
+    found = along.mark_stability(curve, samples=12)
     (branch,) = found.branches
     labels = [run.label for run in branch.runs]
     assert labels.count("stable") == 1

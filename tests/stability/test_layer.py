@@ -13,7 +13,7 @@ from chuteflow.errors import InputError
 from chuteflow.numerics.legendre import lobatto
 from chuteflow.stability.layer import DEGREE, FIELDS, Layer
 from chuteflow.stability.modes import Disturbances
-from chuteflow.stability.relaxation import disturbed
+from chuteflow.stability.relaxation import disturb
 
 PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 #: Chutes with folds of M: two flows at T_surface = 1, on the one side of it and on the other.
@@ -165,7 +165,7 @@ def test_the_balance_of_energy_holds_over_time(known):
     """The energy of a disturbed flow changes by the integral of the power, to the tolerance of the integration."""
     flow, _ = known["productive-cool"]
     layer = Layer.of(flow, 16)
-    start = disturbed(layer.steady(flow), temperature=1.3)
+    start = disturb(layer.steady(flow), temperature=1.3)
     n = len(start)
 
     def with_energy(_, y):

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 import chuteflow
-from chuteflow.numerics.eigenproblem import drift, refined, spectrum
+from chuteflow.numerics.eigenproblem import drift, refine_eigenvalue, spectrum
 from chuteflow.stability.base import Resolution, base
 from chuteflow.stability.linear import operator, without_top
 from chuteflow.stability.modes import Disturbances, relative_fields
-from chuteflow.stability.verdict import leading
+from chuteflow.stability.result import leading
 from chuteflow.steady.chute import Chute
 
 from .reference import Problem
 
 
 def neighbours(flow, change):
-    """The flows with the hold-up a little smaller and larger on the same family."""
+    """The flows with the hold-up a little smaller and larger on the same branch."""
     return [
         min(
             chuteflow.flows(flow.chute, M=flow.mass_holdup * (1.0 + step)),
@@ -28,7 +28,7 @@ def neighbours(flow, change):
 
 
 @pytest.fixture(scope="module")
-def families(three):
+def branches(three):
     """(less, more): neighbours of A, B and C, 0.02 % away in the hold-up."""
     return {name: neighbours(flow, 2e-4) for name, flow in three.items()}
 
@@ -47,14 +47,14 @@ def mass_mode(disturbances, kx):
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C"])
-def test_the_mass_mode_at_rest_leads_to_the_neighbouring_flow(disturbances, families, name):
+def test_the_mass_mode_at_rest_leads_to_the_neighbouring_flow(disturbances, branches, name):
     (mode,) = disturbances[name].modes(0.0, 0.0)
     assert mode.kind == "mass"
     assert abs(mode.sigma) < 1e-10
     heights = mode.height[mode.height < 3.0 * mode.flow.depth]
     nu, u, v, w, T = (field[-len(heights) :] for field in mode.fields)
     by_mass = [
-        slope_of(families[name], lambda flow, f=f: getattr(flow.profile(heights), f))
+        slope_of(branches[name], lambda flow, f=f: getattr(flow.profile(heights), f))
         for f in ("volume_fraction", "velocity", "granular_temperature")
     ]
     scale = np.vdot(by_mass[1], u) / np.vdot(by_mass[1], by_mass[1])
@@ -85,7 +85,7 @@ def test_uniform_disturbances_change_stability_at_a_fold_of_the_holdup():
         assert stable.growth < -0.1
         assert unstable.sigma.imag == pytest.approx(0.0, abs=1e-12)
         growth.append(unstable.growth)
-    # It starts from zero at the fold, as the distance along the family does.
+    # It starts from zero at the fold, as the distance along the branch does.
     assert growth[0] > 1e-4
     assert growth[1] / growth[0] == pytest.approx(2.0, abs=0.1)
 
@@ -94,21 +94,21 @@ def test_uniform_disturbances_change_stability_at_a_fold_of_the_holdup():
 
 
 @pytest.mark.parametrize(("name", "speed"), [("A", -11.788125), ("B", 3.848646), ("C", -33.890025)])
-def test_long_waves_along_the_slope_tend_to_the_kinematic_speed(disturbances, families, name, speed):
-    assert slope_of(families[name], lambda flow: flow.mass_flux) == pytest.approx(speed, rel=3e-5)
+def test_long_waves_along_the_slope_tend_to_the_kinematic_speed(disturbances, branches, name, speed):
+    assert slope_of(branches[name], lambda flow: flow.mass_flux) == pytest.approx(speed, rel=3e-5)
     away = [mass_mode(disturbances[name], kx).speed - speed for kx in (1e-5, 1e-6, 1e-7, 1e-8)]
     assert abs(away[-1]) < 1e-3
     assert all(abs(later) < 0.2 * abs(sooner) or abs(later) < 1e-3 for sooner, later in pairwise(away))
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C"])
-def test_long_waves_across_grow_as_the_pressure_of_the_neighbouring_flow_pushes(three, families, disturbances, name):
-    # nu, T follow the family; v is driven by the gradient of its pressure across and carries the mass:
+def test_long_waves_across_grow_as_the_pressure_of_the_neighbouring_flow_pushes(three, branches, disturbances, name):
+    # nu, T follow the branch; v is driven by the gradient of its pressure across and carries the mass:
     # eta v'' is balanced by i ky dp/dM, with Richman's base; sigma = -i ky Int nu v dz, of order ky^2.
     flow = three[name]
     z = np.linspace(0.0, 25.0 * flow.surface_temperature + 2.0 * flow.depth, 20001)
     at = flow.profile(z)
-    push = slope_of(families[name], lambda other: other.profile(z).normal_stress)
+    push = slope_of(branches[name], lambda other: other.profile(z).normal_stress)
     step = z[1] - z[0]
 
     def from_above(f):
@@ -198,7 +198,7 @@ def test_no_error_is_understated(three, disturbances, name):
     fine = operator(base(three[name], Resolution(112, 19.0, 4.0)))
     for kx, ky in ((1e-3 / h, 0.0), (0.03 / h, 0.0), (0.0, 0.05 / h), (0.5 / h, 0.5 / h), (2.0 / h, 0.0)):
         for mode in leading(disturbances[name], kx, ky, count=2):
-            sigma, _ = refined(fine.matrix(kx, ky), fine.weights, mode.sigma)
+            sigma, _ = refine_eigenvalue(fine.matrix(kx, ky), fine.weights, mode.sigma)
             assert abs(sigma - mode.sigma) < 2.0 * mode.error
 
 

@@ -1,4 +1,4 @@
-"""Neutral curves: of a plane with known ones, of flow A of the paper, and along its family."""
+"""Neutral curves: of a plane with known ones, of flow A of the paper, and along its branch."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -10,9 +10,9 @@ import pytest
 import chuteflow
 from chuteflow.errors import InputError
 from chuteflow.stability.modes import Disturbances
-from chuteflow.stability.neutral import Scan, neutral_curves
+from chuteflow.stability.neutral import EigenvalueGrid, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, family_map, wave_map
-from chuteflow.stability.verdict import leading
+from chuteflow.stability.result import leading
 
 PAPER = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
 
@@ -32,7 +32,7 @@ class KnownPlane:
     def scan(self, points):
         a = b = np.linspace(0.0, 1.0, points)
         leading = self.growth(a[:, None], b) + 0.3j * a[:, None]
-        return Scan(a, b, np.where(leading.real > -2e-5, leading, -2e-5))
+        return EigenvalueGrid(a, b, np.where(leading.real > -2e-5, leading, -2e-5))
 
 
 def circle(a, b, centre=(0.5, 0.5), radius=0.3):
@@ -42,7 +42,7 @@ def circle(a, b, centre=(0.5, 0.5), radius=0.3):
 def test_a_closed_curve_is_followed_all_around():
     plane = KnownPlane(circle)
     (found,) = neutral_curves(plane, plane.scan(9))
-    assert found.ends == ("its own beginning: it is closed",) * 2
+    assert found.ends == ("its own start: it is closed",) * 2
     np.testing.assert_allclose(np.hypot(*(found.z - 0.5).T), 0.3, atol=1e-7)
     angles = np.unwrap(np.arctan2(*(found.z - 0.5).T))
     assert abs(angles[-1] - angles[0]) == pytest.approx(2.0 * np.pi, abs=0.05)
@@ -69,7 +69,7 @@ def test_no_curve_is_made_up_where_growth_is_not_known():
     plane = KnownPlane(lambda a, b: 0.1 * (b - 0.5) + 0.0 * a)
     scan = plane.scan(9)
     unknown = np.broadcast_to(scan.b > 0.3, scan.sigma.shape)
-    masked = Scan(scan.a, scan.b, np.where(unknown, np.nan, scan.sigma), unresolved=unknown)
+    masked = EigenvalueGrid(scan.a, scan.b, np.where(unknown, np.nan, scan.sigma), unresolved=unknown)
     assert len(neutral_curves(plane, scan)) == 1
     assert neutral_curves(plane, masked) == []
 

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 import chuteflow
 from chuteflow.errors import InputError, SolveError
 from chuteflow.stability.layer import FIELDS, Layer
-from chuteflow.stability.relaxation import disturbed, outcome, relax
+from chuteflow.stability.relaxation import disturb, outcome, relax
 
 from .finite_volumes import Cells
 
@@ -28,7 +28,7 @@ def pair():
 
 def followed(flow, duration, degree=24, tolerance=1e-7, **factors):
     layer = Layer.of(flow, degree)
-    return layer, list(relax(layer, disturbed(layer.steady(flow), **factors), duration, tolerance))
+    return layer, list(relax(layer, disturb(layer.steady(flow), **factors), duration, tolerance))
 
 
 @pytest.mark.parametrize("which", [0, 1, 2])
@@ -126,7 +126,7 @@ def test_a_large_disturbance_goes_the_same_way_by_finite_volumes(paper):
     flow = paper[1]
     times = np.array([0.5, 2.0, 5.0, 10.0, 20.0])
     layer = Layer.of(flow, 32)
-    start = disturbed(layer.steady(flow), temperature=1.5, velocity=0.8)
+    start = disturb(layer.steady(flow), temperature=1.5, velocity=0.8)
     spectral = solve_ivp(
         lambda _, y: layer.rate(y), (0.0, 20.0), start, "Radau", times, jac=lambda _, y: layer.jacobian(y), rtol=1e-6
     )
@@ -155,7 +155,7 @@ def test_a_large_disturbance_goes_the_same_way_by_finite_volumes(paper):
 def test_a_disturbance_multiplies_temperature_and_velocity_and_leaves_density(paper):
     layer = Layer.of(paper[0], 12)
     state = layer.steady(paper[0])
-    before, after = state.reshape(FIELDS, -1), disturbed(state, temperature=2.0, velocity=3.0).reshape(FIELDS, -1)
+    before, after = state.reshape(FIELDS, -1), disturb(state, temperature=2.0, velocity=3.0).reshape(FIELDS, -1)
     np.testing.assert_array_equal(after[0], before[0])
     np.testing.assert_allclose(after[1], 3.0 * before[1])
     np.testing.assert_allclose(np.exp(after[3]), 2.0 * np.exp(before[3]))
@@ -165,10 +165,10 @@ def test_a_disturbance_multiplies_temperature_and_velocity_and_leaves_density(pa
 def test_factors_out_of_range_are_refused(paper, factors):
     layer = Layer.of(paper[0], 12)
     with pytest.raises(InputError, match="must be above 0"):
-        disturbed(layer.steady(paper[0]), **factors)
+        disturb(layer.steady(paper[0]), **factors)
 
 
 def test_what_cannot_be_followed_is_said(paper):
     layer = Layer.of(paper[0], 12)
     with pytest.raises(SolveError, match="disturb it less"):
-        list(relax(layer, disturbed(layer.steady(paper[0]), temperature=1000.0), 10.0))
+        list(relax(layer, disturb(layer.steady(paper[0]), temperature=1000.0), 10.0))

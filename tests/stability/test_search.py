@@ -7,7 +7,7 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, stability_of
-from chuteflow.numerics.eigenproblem import refined, refined_pair
+from chuteflow.numerics.eigenproblem import refine_eigenpair, refine_eigenvalue
 from chuteflow.stability.modes import Disturbances, leading
 
 from .brute import MISSED, campaign, highest
@@ -22,7 +22,7 @@ STEEP = Chute(0.568, 0.627, 0.478, 0.847)
         pytest.param(STEEP, 8.5, 0, 0.0041611, (0.004704, 0.032544), marks=pytest.mark.slow),
         pytest.param(STEEP, 9.5, 0, 0.0094762, (0.004997, 0.042771), marks=pytest.mark.slow),
         (Chute(0.536202, 0.675958, 0.482668, 0.800872), 13.198687, 1, 0.00808, (0.003333, 0.027242)),
-        # Two modes cross at kx = 0, and the climb from beside it ends in the other one.
+        # Two modes cross at kx = 0, and the maximisation from beside it ends in the other one.
         pytest.param(Chute(0.461, 0.605, 0.577, 0.566), 3.508, 0, 0.134356, (0.0, 0.05287), marks=pytest.mark.slow),
     ],
 )
@@ -60,24 +60,26 @@ def test_the_fastest_wave_is_that_of_a_map_by_brute_force(which):
         assert not found.grows or (found.mode is not None and found.mode.direction == "uniform")
         return
     assert found.mode is not None
-    assert found.mode.growth > (1.0 - 1e-3) * max(peak.growth, peak.summit)
+    assert found.mode.growth > (1.0 - 1e-3) * max(peak.growth, peak.maximum)
 
 
 def test_the_derivatives_of_an_eigenvalue_are_those_of_differences(disturbances):
     kx, ky, step = 0.03, 0.02, 1e-5
     (mode,) = leading(disturbances["A"], kx, ky)
     of = disturbances["A"].coarse_operator(kx, ky)
-    pair = refined_pair(of.matrix(kx, ky), of.weights, mode.sigma)
+    pair = refine_eigenpair(of.matrix(kx, ky), of.weights, mode.sigma)
     exact = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
     for i, (x, y) in enumerate(((step, 0.0), (0.0, step))):
-        ahead, behind = (refined(of.matrix(kx + s * x, ky + s * y), of.weights, pair.value)[0] for s in (1.0, -1.0))
+        ahead, behind = (
+            refine_eigenvalue(of.matrix(kx + s * x, ky + s * y), of.weights, pair.value)[0] for s in (1.0, -1.0)
+        )
         assert exact[i] == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
 def test_a_pair_is_alike_to_itself_and_not_to_another(disturbances):
     of = disturbances["A"].coarse_operator(0.1, 0.05)
     one, other = disturbances["A"].candidates(0.1, 0.05)[:2]
-    pairs = [refined_pair(of.matrix(0.1, 0.05), of.weights, complex(sigma)) for sigma in (one, other)]
+    pairs = [refine_eigenpair(of.matrix(0.1, 0.05), of.weights, complex(sigma)) for sigma in (one, other)]
     assert pairs[0].likeness(pairs[0], of.weights) == pytest.approx(1.0)
     assert pairs[0].likeness(pairs[1], of.weights) < 1e-6
     residual = pairs[0].left.conj() @ of.matrix(0.1, 0.05) - pairs[0].value * pairs[0].left.conj() * of.weights

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, Flow, InputError, curve, flows
-from chuteflow.numerics.continuation import Control, Point, fold_of, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, fold_of, locate, trace
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.mapped.solution import (
     DEGREES,
@@ -20,7 +20,7 @@ from chuteflow.steady.mapped.solution import (
     sampling,
     solve_mapped,
 )
-from chuteflow.steady.solver import Condition, Status
+from chuteflow.steady.solver import Condition, SolverStatus
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 CHUTES = {
@@ -103,7 +103,7 @@ def test_the_error_is_honest_also_where_it_is_large(name, temperature, multiple)
     for flow in flows(chute, T_surface=temperature, tolerance=1e-11):
         for degree in (8, 14, 24, 60):
             mapped = solve_mapped(chute, flow, condition, degree, multiple=multiple)
-            if mapped.status is Status.NO_CONVERGENCE:
+            if mapped.status is SolverStatus.NO_CONVERGENCE:
                 assert np.isnan(mapped.macroscopic).all()
                 continue
             true = np.abs(mapped.macroscopic - flow.solution.macroscopic)[:LOG_T].max()
@@ -234,7 +234,7 @@ def test_another_degree_and_multiple_is_the_same_flow():
 def test_a_cold_flow_on_the_half_line_is_said_to_be_unresolved():
     (flow,) = flows(PAPER, T_surface=0.04)
     mapped = refine(PAPER, flow, Condition.fix(LOG_T, 0.04), largest_degree=150)
-    assert mapped.status is Status.UNRESOLVED
+    assert mapped.status is SolverStatus.UNRESOLVED
     assert mapped.degree == 150
     assert np.abs(mapped.macroscopic - flow.solution.macroscopic)[:LOG_T].max() <= mapped.error < 0.1
 
@@ -242,7 +242,7 @@ def test_a_cold_flow_on_the_half_line_is_said_to_be_unresolved():
 def test_what_only_the_discrete_equations_know_is_not_believed():
     # L = 2 T_inf is far too short for a cold flow.
     mapped = solve_mapped(PAPER, references("paper")[2], AT_FLUX, 64, multiple=1)
-    assert mapped.status is Status.UNRESOLVED
+    assert mapped.status is SolverStatus.UNRESOLVED
     assert mapped.residual > 1.0
     assert mapped.error == np.inf
 
@@ -250,7 +250,7 @@ def test_what_only_the_discrete_equations_know_is_not_believed():
 def test_no_flow_is_no_flow():
     # Q has a minimum of 2.77 on the branch of A and B.
     mapped = solve_mapped(PAPER, references("paper")[0], Condition.fix(LOG_Q, 0.3), 24)
-    assert mapped.status is Status.NO_CONVERGENCE
+    assert mapped.status is SolverStatus.NO_CONVERGENCE
     assert mapped.error == np.inf
     assert np.isnan(mapped.macroscopic).all()
 
@@ -294,7 +294,9 @@ def test_the_best_multiple_follows_the_depth():
 # Continuation
 
 
-def traced(solution: MappedSolution, direction: float, coldest: float, control: Control) -> list[Point[MappedSystem]]:
+def traced(
+    solution: MappedSolution, direction: float, coldest: float, control: ContinuationSettings
+) -> list[CurvePoint[MappedSystem]]:
     """Points from a solution on, as ln S times ``direction`` grows, until T_surface is below ``coldest``."""
     degree = min(d for d in DEGREES if d >= solution.degree)
     system, matrix = solution.system.transferred(degree, solution.system.multiple)
@@ -310,7 +312,7 @@ def traced(solution: MappedSolution, direction: float, coldest: float, control: 
 
 @pytest.mark.parametrize("name", ["paper", "interface"])
 def test_the_curve_is_followed_through_both_folds_of_the_flux(name):
-    control = Control(initial_step=0.05, max_step=0.4, max_angle=0.3, tolerance=1e-9, min_step=1e-6)
+    control = ContinuationSettings(initial_step=0.05, max_step=0.4, max_angle=0.3, tolerance=1e-9, min_step=1e-6)
     start = refine(CHUTES[name], references(name)[0], AT_FLUX)
     points = traced(start, -1.0, 0.5, control)
     fold = fold_of(lambda z, system: np.eye(len(z))[-1])
@@ -325,14 +327,14 @@ def test_the_curve_is_followed_through_both_folds_of_the_flux(name):
 
 
 def test_the_curve_adapts_degree_and_multiple_and_passes_the_known_flows():
-    control = Control(initial_step=0.05, max_step=0.4, max_angle=0.3, tolerance=1e-9, min_step=1e-6)
+    control = ContinuationSettings(initial_step=0.05, max_step=0.4, max_angle=0.3, tolerance=1e-9, min_step=1e-6)
     start = refine(PAPER, references("paper")[1], AT_FLUX)
     points = traced(start, -1.0, 0.25, control)
     assert points[-1].system.degree > 2 * points[0].system.degree
     assert points[-1].system.multiple > points[0].system.multiple
     last = points[-1]
     near = MappedSolution(
-        last.system, last.z, last.system.macroscopic(last.z), np.inf, np.inf, Status.CONVERGED, last.iterations
+        last.system, last.z, last.system.macroscopic(last.z), np.inf, np.inf, SolverStatus.CONVERGED, last.iterations
     )
     third = refine(PAPER, near, AT_FLUX)
     np.testing.assert_allclose(third.macroscopic, references("paper")[2].solution.macroscopic, atol=1e-8)

@@ -1,11 +1,11 @@
-"""Sweeps at a given quantity lose none of the flows near turns that the search by families finds."""
+"""Sweeps at a given quantity lose none of the flows near turns that the search by branches finds."""
 
 import numpy as np
 import pytest
 
 from chuteflow import Chute, curve, flows
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
-from chuteflow.sweeps.at_quantity import at_quantity
+from chuteflow.sweeps.at_quantity import solve_at_quantity
 from chuteflow.sweeps.batch import Batch
 
 #: Chutes at centres of mass that two flows share, near a turn of h that lies between two columns.
@@ -18,7 +18,7 @@ PAIRS = [
 def swept(parameters, which, values):
     columns = np.array(parameters, dtype=float).reshape(-1, 4).T
     batch = Batch.of("lun", "free", *columns)
-    found, unsettled = at_quantity(batch, which, np.array(values, dtype=float), (1e-3, 1e5), 30.0, 1e-10)
+    found, unsettled = solve_at_quantity(batch, which, np.array(values, dtype=float), (1e-3, 1e5), 30.0, 1e-10)
     return np.bincount(found.member, minlength=len(batch)), unsettled, found
 
 
@@ -45,7 +45,7 @@ def test_just_past_a_cusp_no_lane_is_settled_with_flows_missing():
 
 @pytest.mark.slow
 def test_near_folds_settled_lanes_have_the_flows_of_the_search_by_families():
-    # Deeper families that live between two columns alone are a matter of the search, not of turns.
+    # Deeper branches that live between two columns alone are a matter of the search, not of turns.
     shallow = 4.0
     random = np.random.default_rng(5)
     parameters, fluxes = [], []

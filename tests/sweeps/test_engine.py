@@ -18,7 +18,7 @@ from chuteflow.sweeps.batch import Batch
 from chuteflow.sweeps.engine import solve_chunk
 from chuteflow.sweeps.marching import start
 from chuteflow.sweeps.numbers import ONE_BY_ONE
-from chuteflow.sweeps.outcome import Reason, Status
+from chuteflow.sweeps.outcome import PointStatus, Reason
 from chuteflow.sweeps.study import from_dict
 from chuteflow.theory.boundary import surface_stress
 
@@ -27,7 +27,7 @@ VALUES = {"T_surface": (1e-2, 1e4), "Q": (1e-2, 1e4), "M": (5e-2, 20.0), "h": (0
 KINDS = {"interior": INTERIORS, "density": DENSITIES}
 MACROSCOPIC = ("mass_flux", "centre_of_mass", "mass_holdup")
 PAPER = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
-#: Laws that are marched side by side, in the order of their numbers.
+#: Laws that are integrated in batches, in the order of their numbers.
 CLOSURES = ("lun", "lun-fourier")
 
 #: Quantities for which chutes are solved in batches.
@@ -70,7 +70,7 @@ def bases_below(chute, temperature, stress):
 
     def along(log_p, state):
         rows = np.array([[log_p], [state[0]], [state[1]], [0.0], [0.0], [0.0]])
-        return one.along(rows), rows
+        return one.at_state(rows), rows
 
     def rate(log_p, state):
         at, rows = along(log_p, state)
@@ -118,7 +118,7 @@ def assert_same_flows(chunk, i, found):
 def compare(condition, points, seed):
     study = random_study(condition, points, seed)
     chunk = solve_chunk(study, 0)
-    assert (chunk.status == Status.COMPLETE).all()
+    assert (chunk.status == PointStatus.COMPLETE).all()
     assert ((chunk.reason == Reason.HAS_FLOWS) == (chunk.n_flows > 0)).all()
     assert (chunk.error[chunk.error > 0] <= study.tolerance).all()
     more = 0
@@ -162,7 +162,7 @@ def test_three_flows_of_the_paper():
 def test_flows_that_do_not_fit_are_counted_and_told():
     chunk = solve_chunk(paper_study("Q", [3.0], flows=2), 0)
     assert chunk.n_flows[0] == 3
-    assert chunk.status[0] == Status.MORE_FLOWS_THAN_KEPT
+    assert chunk.status[0] == PointStatus.MORE_FLOWS_THAN_KEPT
     assert chunk.quantities["surface_temperature"][0] == pytest.approx([7.34, 2.54], rel=3e-3)
 
 
@@ -199,7 +199,12 @@ def test_what_is_no_chute_is_told_and_stops_nothing():
         Path(),
     )
     chunk = solve_chunk(study, 0)
-    assert chunk.status.tolist() == [Status.COMPLETE, Status.INVALID, Status.INVALID, Status.INVALID]
+    assert chunk.status.tolist() == [
+        PointStatus.COMPLETE,
+        PointStatus.INVALID,
+        PointStatus.INVALID,
+        PointStatus.INVALID,
+    ]
     assert chunk.n_flows.tolist() == [1, 0, 0, 0]
     assert chunk.failures[1] == "slope = -1: must be from 1e-08 to 10000"
     assert chunk.failures[2] == "e = 1.2: must be from 1e-08 to 1"
@@ -220,13 +225,18 @@ def test_a_law_that_loses_its_meaning_is_told(monkeypatch):
         chunk = solve_chunk(study, 0)
     finally:
         engine._meaningful.cache_clear()
-    assert chunk.status.tolist() == [Status.INVALID, Status.INVALID, Status.COMPLETE, Status.COMPLETE]
+    assert chunk.status.tolist() == [
+        PointStatus.INVALID,
+        PointStatus.INVALID,
+        PointStatus.COMPLETE,
+        PointStatus.COMPLETE,
+    ]
     assert chunk.failures == {0: "no meaning, on purpose", 1: "no meaning, on purpose"}
 
 
 def broken_at(slope):
     """The engine of given surface temperatures, broken by one chute."""
-    sound = engine.at_temperature
+    sound = engine.solve_at_temperature
 
     def broken(batch, *others):
         if (batch.slope == slope).any():
@@ -243,7 +253,7 @@ def slopes_study():
 
 def test_a_chute_that_breaks_its_batch_is_solved_alone(monkeypatch):
     sound = solve_chunk(slopes_study(), 0)
-    monkeypatch.setattr(engine, "at_temperature", broken_at(0.31))
+    monkeypatch.setattr(engine, "solve_at_temperature", broken_at(0.31))
     chunk = solve_chunk(slopes_study(), 0)
     assert chunk.singly == 1
     assert not chunk.failures
@@ -258,10 +268,10 @@ def test_a_chute_that_cannot_be_solved_at_all_is_told(monkeypatch):
     def given_up(*_, **__):
         raise SolveError("given up on purpose")
 
-    monkeypatch.setattr(engine, "at_temperature", broken_at(0.31))
+    monkeypatch.setattr(engine, "solve_at_temperature", broken_at(0.31))
     monkeypatch.setattr(engine, "flows_within", given_up)
     chunk = solve_chunk(slopes_study(), 0)
-    assert chunk.status.tolist() == [0, 0, 0, Status.FAILED, 0]
+    assert chunk.status.tolist() == [0, 0, 0, PointStatus.FAILED, 0]
     assert chunk.reason[3] == Reason.NO_ANSWER
     assert chunk.failures == {3: "given up on purpose"}
     assert (chunk.n_flows > 0).tolist() == [True, True, True, False, True]

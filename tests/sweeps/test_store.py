@@ -14,7 +14,7 @@ import zarr
 from chuteflow.errors import InputError
 from chuteflow.sweeps import store as module
 from chuteflow.sweeps.engine import solve_chunk
-from chuteflow.sweeps.outcome import Status
+from chuteflow.sweeps.outcome import PointStatus
 from chuteflow.sweeps.store import DamageError, Marker, Store, StoreError
 from chuteflow.sweeps.study import from_dict
 from chuteflow.sweeps.work import work
@@ -76,8 +76,8 @@ def test_the_last_chunk_may_be_a_part(tmp_path, table):
     work(str(store.path), 1)
     with xarray.open_zarr(store.path) as data:
         assert data.sizes["point"] == 40
-        assert (data["status"][:32] == Status.NOT_COMPUTED).all()
-        assert (data["status"][32:] == Status.COMPLETE).all()
+        assert (data["status"][:32] == PointStatus.NOT_COMPUTED).all()
+        assert (data["status"][32:] == PointStatus.COMPLETE).all()
         assert np.isnan(data["mass_flux"][:32]).all()
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from chuteflow.errors import InputError
 from chuteflow.steady.quantities import NUMBERS
-from chuteflow.sweeps.judged import JUDGED_NUMBERS
-from chuteflow.sweeps.outcome import Status
+from chuteflow.sweeps.outcome import PointStatus
+from chuteflow.sweeps.stability import STABILITY_NUMBERS
 from chuteflow.sweeps.study import KINDS, from_canonical, from_dict, read
 
 FIXED = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "T_surface": 1.0}
@@ -236,5 +236,5 @@ def test_the_study_of_the_documents_is_a_study(tmp_path):
     assert one.points == 20000
     assert one.chunks == 3
     # Every quantity that can be kept is named.
-    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS, *JUDGED_NUMBERS))
-    assert all(f"{status.value} `{status.name.lower()}`" in page for status in Status)
+    assert all(f"`{name}`" in page for name in (*NUMBERS, *KINDS, *STABILITY_NUMBERS))
+    assert all(f"{status.value} `{status.name.lower()}`" in page for status in PointStatus)

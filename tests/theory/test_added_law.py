@@ -51,9 +51,9 @@ def base(nu):
     g0, g1, g2 = table_1(nu)[:3]
     lid = math.sqrt(1.0 - R**2)
     kappa = 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)
-    grip = kappa - 0.5 * R**2 * (1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0)))
-    f1 = SLOPE / kappa * (math.sqrt(math.pi / 2.0) + grip * g1 / g2)
-    bracket = kappa * f1**2 - g1 * SLOPE / g2 * grip * f1 - 2.0 * (1.0 - E_W) / (1.0 + lid)
+    wall_shear = kappa - 0.5 * R**2 * (1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0)))
+    f1 = SLOPE / kappa * (math.sqrt(math.pi / 2.0) + wall_shear * g1 / g2)
+    bracket = kappa * f1**2 - g1 * SLOPE / g2 * wall_shear * f1 - 2.0 * (1.0 - E_W) / (1.0 + lid)
     return f1, g1 * math.sqrt(2.0 / math.pi) * bracket
 
 

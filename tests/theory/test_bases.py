@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, flows, hot, stability_of
-from chuteflow.steady.model import GRIP, SHEAR, model
+from chuteflow.steady.model import SHEAR, WALL_SHEAR, model
 from chuteflow.theory.bases import BASES, base
 from chuteflow.theory.laws import LAWS
 
@@ -26,9 +26,9 @@ def of_model(name, nu):
     bumps = 1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0))
     f = np.zeros((8, len(nu)))
     if name.startswith("richman"):
-        f[SHEAR], f[GRIP] = g1 / g2, bumps * g1 / g2
+        f[SHEAR], f[WALL_SHEAR] = g1 / g2, bumps * g1 / g2
     else:
-        f[SHEAR], f[GRIP] = g1 / nu / g0, g0 * nu / g1
+        f[SHEAR], f[WALL_SHEAR] = g1 / nu / g0, g0 * nu / g1
     return m.slip(f), m.base_flux(f)
 
 
@@ -44,8 +44,8 @@ def test_richman_with_hemispheres_of_another_size(diameter):
     # M_x = P_xz with (2.10) and (2.13): kappa u_s + dbar (kappa - A r^2/2) du/dz
     expected = SLOPE / kappa * (math.sqrt(math.pi / 2.0) + mean * (kappa - 0.5 * bumps * r * r) * g1 / g2)
     on = base(f"richman:diameter={diameter}")
-    shear, grip = g1 / g2, (1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0))) * g1 / g2
-    np.testing.assert_allclose(on.slip(shear, grip, r, SLOPE), expected, rtol=1e-12)
+    shear, wall_shear = g1 / g2, (1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * nu * g0))) * g1 / g2
+    np.testing.assert_allclose(on.slip(shear, wall_shear, r, SLOPE), expected, rtol=1e-12)
 
 
 def test_johnson_and_jackson_as_printed():

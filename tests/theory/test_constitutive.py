@@ -77,7 +77,7 @@ def test_the_reduced_functions_give_the_printed_equations(nu, e, slope, r):
     assert f.coupling == pytest.approx(want["g4"] / want["g3"], rel=1e-11)
     k = kappa(r)
     f1 = slope / k * (np.sqrt(np.pi / 2) + (k - 0.5 * want["A"] * r**2) * g1 / g2)  # (3.16)
-    assert slip_coefficient(f.shear, f.grip, r, slope) == pytest.approx(f1, rel=1e-10, abs=1e-10)
+    assert slip_coefficient(f.shear, f.wall_shear, r, slope) == pytest.approx(f1, rel=1e-10, abs=1e-10)
     loss = 2.0 * (1.0 - 0.7) / (1.0 + np.sqrt(1.0 - r**2))
     f2 = g1 * np.sqrt(2 / np.pi) * (k * f1**2 - g1 * slope / g2 * (k - 0.5 * want["A"] * r**2) * f1 - loss)
     assert slope * f1 - base_loss(0.7, r) == pytest.approx(f2 / g1, rel=1e-8, abs=1e-8)  # (3.18)
@@ -93,7 +93,7 @@ def test_table_2_is_the_empty_limit(e):
     assert f.conduction == pytest.approx(g30)
     assert f.coupling == pytest.approx(15 * pi * e * (1 - e) / (2 * (49 - 33 * e)) / g30)
     assert f.loss == pytest.approx(12 / pi * (1 - e**2))
-    assert f.grip == pytest.approx(5 * np.pi / (96 * np.sqrt(2)) / g20)  # A0/g20
+    assert f.wall_shear == pytest.approx(5 * np.pi / (96 * np.sqrt(2)) / g20)  # A0/g20
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -84,11 +84,11 @@ def test_boundary_functions_are_the_limits_of_3_16_and_3_18(name):
     for nu in (1e-4, 1e-5):
         x = np.array([nu / (1.0 - nu / LAWS[name].densest)])
         f = reduce(LAWS[name], x, e, slope)
-        shear, grip = f.shear[0], f.grip[0]
+        shear, wall_shear = f.shear[0], f.wall_shear[0]
         g1 = nu * f.compressibility[0]
         k = boundary.kappa(r)
-        F1 = slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * r**2 * grip)
-        within = k * F1**2 - slope * (k * shear - 0.5 * r**2 * grip) * F1
+        F1 = slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * r**2 * wall_shear)
+        within = k * F1**2 - slope * (k * shear - 0.5 * r**2 * wall_shear) * F1
         F2 = g1 * math.sqrt(2.0 / math.pi) * (within - 2.0 * (1.0 - e_w) / (1.0 + math.sqrt(1.0 - r**2)))
         errors.append((F1 - limit.F10, F2 / nu - limit.F21))
     assert np.abs(errors[1]).max() < 1e-3
@@ -113,7 +113,7 @@ def test_scales_are_consistent():
     a = hot(paper(0.3)).parameters
     assert a.lambda_ == pytest.approx(2.0 * MATERIAL.g30 / (3.0 * a.delta * a.alpha**2), rel=1e-13)
     assert 2.0 * MATERIAL.g30 / 3.0 == pytest.approx(a.F21 * a.alpha, rel=1e-13)
-    # The share of shear in the flux does not depend on alpha.
+    # The fraction of shear in the flux does not depend on alpha.
     assert a.mu * a.lambda_ == pytest.approx(0.3 * a.F21 / (MATERIAL.g20 * a.F10 * a.delta), rel=1e-13)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, boundary, curve, flows, hot, load, save, stability_of
-from chuteflow.maps.plane import Axis, Plane, summary
+from chuteflow.maps.plane import ParameterAxis, ParameterPlane, summarise
 from chuteflow.theory.laws import LAWS
 from chuteflow.theory.lun import LUN
 
@@ -46,8 +46,10 @@ def _growth(flow):
 
 
 def _kinds(chute):
-    plane = Plane(Axis("wall_restitution", 0.5, 0.9), Axis("roughness", 0.55, 0.7), chute, ())
-    return [summary(plane, share, share) for share in (0.2, 0.5, 0.8)]
+    plane = ParameterPlane(
+        ParameterAxis("wall_restitution", 0.5, 0.9), ParameterAxis("roughness", 0.55, 0.7), chute, ()
+    )
+    return [summarise(plane, share, share) for share in (0.2, 0.5, 0.8)]
 
 
 @pytest.mark.parametrize(

@@ -104,9 +104,9 @@ def plain_motion(nu, T, u, rate, heating, thinning, slope=0.3):
 
 def grains_of(chute):
     from chuteflow.theory.laws import law
-    from chuteflow.theory.transport import Grains
+    from chuteflow.theory.transport import Material
 
-    return Grains(law(chute.closure), chute.restitution, chute.slope)
+    return Material(law(chute.closure), chute.restitution, chute.slope)
 
 
 @pytest.mark.parametrize("nu", [0.05, 0.3, 0.5])

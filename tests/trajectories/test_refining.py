@@ -8,11 +8,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chuteflow import Chute, flows
-from chuteflow.branches.families import doubt
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import explain_incompleteness
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
-from chuteflow.trajectories.refining import REFINEMENT, carry_down
+from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
 from chuteflow.trajectories.tables import tables
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
@@ -67,7 +67,7 @@ def test_no_trajectory_leaves_a_region(chute):
     seen = set()
     for _ in range(400):
         p, big_l, y = 10.0 ** random.uniform(-2.0, 1.3), random.uniform(-9.0, 6.0), scale * random.uniform(-3.0, 3.0)
-        region = kernel.region_of(bounds, p, big_l, y)
+        region = kernel.find_region(bounds, p, big_l, y)
         if region == kernel.FREE or (region in seen and len(seen) == 3 and random.random() < 0.9):
             continue
         seen.add(region)
@@ -81,7 +81,7 @@ def test_no_trajectory_leaves_a_region(chute):
 @pytest.mark.parametrize("chute", WINDING, ids=str)
 def test_trajectories_are_those_of_another_integrator(chute):
     problem = model(chute)
-    grid = carry_down(problem, 0.1, 100.0, 3.0)
+    grid = integrate_trajectories(problem, 0.1, 100.0, 3.0)
     derivative = equations(problem)
     first, last = len(grid.overburden) - 30, len(grid.overburden) - 10
     p = grid.overburden[[first, last]] + problem.surface_stress
@@ -103,7 +103,10 @@ def test_a_finer_grid_shows_the_same_flows(chute):
     problem = model(chute)
     finer = replace(REFINEMENT, delta=0.1, finest=0.006, lengths=0.2, per_decade=20.0)
     counts = [
-        [crossings_of(carry_down(problem, 1e-3, 1e5, 25.0, refinement), mass) for mass in (2.0, 7.5, 12.0, 19.0, 24.0)]
+        [
+            crossings_of(integrate_trajectories(problem, 1e-3, 1e5, 25.0, refinement), mass)
+            for mass in (2.0, 7.5, 12.0, 19.0, 24.0)
+        ]
         for refinement in (REFINEMENT, finer)
     ]
     assert counts[0] == counts[1]
@@ -118,7 +121,7 @@ def crossings_of(grid, mass):
 
 @pytest.mark.parametrize("chute", [PAPER, *WINDING], ids=str)
 def test_branches_end_at_the_edges_of_the_range_alone(chute):
-    grid = carry_down(model(chute), 1e-3, 1e5, 25.0)
+    grid = integrate_trajectories(model(chute), 1e-3, 1e5, 25.0)
     assert grid.complete
     assert not len(grid.undecided)
     for branch in grid.branches:
@@ -131,7 +134,7 @@ def test_branches_end_at_the_edges_of_the_range_alone(chute):
 
 
 def test_a_grid_that_grows_too_large_says_where_it_ends():
-    grid = carry_down(model(WINDING[0]), 1e-3, 1e5, 25.0, replace(REFINEMENT, most=20_000))
+    grid = integrate_trajectories(model(WINDING[0]), 1e-3, 1e5, 25.0, replace(REFINEMENT, most=20_000))
     assert not grid.complete
     assert 1.0 < grid.deepest < 25.0
     assert len(grid.states) <= 20_000
@@ -148,7 +151,10 @@ def test_on_random_chutes_the_flows_are_those_of_a_finer_grid():
         in_doubt = answer.incomplete is not None and "does not tell flows apart" in answer.incomplete
         doubtful += in_doubt
         assert in_doubt or answer.incomplete is None or "outside the range" in answer.incomplete
-        assert len(answer) == crossings_of(carry_down(model(chute), 1e-3, 1e5, 30.0, finer), mass), (chute, mass)
+        assert len(answer) == crossings_of(integrate_trajectories(model(chute), 1e-3, 1e5, 30.0, finer), mass), (
+            chute,
+            mass,
+        )
         found += len(answer)
     assert found > DRAWN // 2
     assert doubtful <= DRAWN // 10
@@ -169,12 +175,12 @@ def winding(random):
 def test_a_cell_too_short_to_be_divided_in_which_the_residual_turns_to_zero_is_undecided():
     """A coarse limit makes cells undecided that are divided otherwise; the flows there are named as doubtful."""
     problem = model(WINDING[0])
-    coarse = carry_down(problem, 1e-3, 1e5, 25.0, replace(REFINEMENT, delta=0.8, finest=0.7))
-    fine = carry_down(problem, 1e-3, 1e5, 25.0)
+    coarse = integrate_trajectories(problem, 1e-3, 1e5, 25.0, replace(REFINEMENT, delta=0.8, finest=0.7))
+    fine = integrate_trajectories(problem, 1e-3, 1e5, 25.0)
     assert len(coarse.undecided) > len(fine.undecided) == 0
     assert coarse.hidden.shape == (len(coarse.undecided), 4)
     assert (coarse.hidden[:, 2] <= np.log(25.0) + 1e-9).all()
     assert fine.cells > coarse.cells > 1000
-    left = doubt(coarse, Range(1e-3, 1e5, 25.0, 0.0), [], ("a flow", "flows"))
+    left = explain_incompleteness(coarse, SearchRange(1e-3, 1e5, 25.0, 0.0), [], ("a flow", "flows"))
     assert left is not None
     assert "does not tell flows apart near M = " in left

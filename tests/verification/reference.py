@@ -91,12 +91,12 @@ class Table1:
         lid = math.sqrt(1.0 - c.r**2)
         kappa = 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)  # (2.11)
         a = 1.0 + math.pi / (12.0 * math.sqrt(2.0)) * (1.0 + 5.0 / (8.0 * self.nu * self.g0))  # (2.12)
-        grip = kappa - 0.5 * a * c.r**2
-        f1 = c.slope / kappa * (math.sqrt(math.pi / 2.0) + grip * self.g1 / self.g2)
+        wall_shear = kappa - 0.5 * a * c.r**2
+        f1 = c.slope / kappa * (math.sqrt(math.pi / 2.0) + wall_shear * self.g1 / self.g2)
         f2 = (
             self.g1
             * math.sqrt(2.0 / math.pi)
-            * (kappa * f1**2 - self.g1 * c.slope / self.g2 * grip * f1 - 2.0 * (1.0 - c.e_w) / (1.0 + lid))
+            * (kappa * f1**2 - self.g1 * c.slope / self.g2 * wall_shear * f1 - 2.0 * (1.0 - c.e_w) / (1.0 + lid))
         )
         return f1, f2
 
@@ -159,7 +159,7 @@ def derivative(case: Case, log_p: Any, z: Array) -> Array:
 def start(case: Case, p: Any, surface_temperature: Any) -> Array:
     """State (7, ...) at normal stress ``p`` below a surface, by (3.23)-(3.25) or (3.31)-(3.32).
 
-    On the half-line the leading terms err by the share (p/T)^2 in T and p/T in q, which is itself of order p^2.
+    On the half-line the leading terms err by the fraction (p/T)^2 in T and p/T in q, which is itself of order p^2.
     """
     t, p = np.broadcast_arrays(np.asarray(surface_temperature, dtype=float), np.asarray(p, dtype=float))
     z = np.zeros((7, *t.shape))
@@ -233,7 +233,7 @@ def macroscopic(case: Case, z: Array, p: Any, p0: Any, surface_temperature: Any)
     mass = p - case.p_s
     f1, f2 = (g := Table1(case, *densities(z[LOGIT]))).bases()
     root_t = np.exp(0.5 * z[B])
-    # above the start depth = T ln(p/p0) and W = 0, to the share p0/T
+    # above the start depth = T ln(p/p0) and W = 0, to the fraction p0/T
     moment = z[DEPTH] * mass - z[DEPTH_MOMENT] + top * surface_temperature
     flux = (f1 * root_t + z[LOST]) * mass - z[LOST_MOMENT]
     excess = z[HEAT] / (p * root_t) - f2 / g.g1
@@ -434,7 +434,7 @@ def _joints(shooting: Shooting, x: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(eq=False)
 class Patch:
-    """Trajectories side by side by fixed steps: rows are values of p, columns surface temperatures.
+    """A batch of trajectories by fixed steps: rows are values of p, columns surface temperatures.
 
     ``b``, ``y``, ``logit`` (K, C) as in the notation; ``excess`` the base condition; ``logs`` (4, K, C) ln Q, ln h,
     ln M, ln T_surface were the base there. A patch other than the first lies between column ``column`` and the next
@@ -455,7 +455,7 @@ class Patch:
     row: int = 0
 
 
-#: Columns are torn apart where ln T or the logit differ by more; a patch begins where they differ by less.
+#: Columns are diverging where ln T or the logit differ by more; a patch begins where they differ by less.
 TORN, NEAR = 1.0, 0.03
 #: Columns of a patch, and the most generations of patches.
 INSERTED, GENERATIONS = 33, 60
@@ -618,7 +618,7 @@ class Scan:
 
 
 def _rows(first: float, p_s: float, mass: float, rate: float) -> Array:
-    """Values of p: at first the overburden grows by 8 % a step, then by a fixed share of the shortest length."""
+    """Values of p: at first the overburden grows by 8 % a step, then by a fixed fraction of the shortest length."""
     step = min(0.15 / (rate + 1e-12), 0.05)
     thin = first if p_s == 0.0 else 1e-6 * min(1.0, step)
     turn = min(max(step / 0.08, thin), mass)

@@ -15,7 +15,7 @@ from chuteflow import Chute, Flow, FlowSet, SolveError, flows
 
 #: Seconds of processor time after which an answer has come too late.
 LIMIT = 20.0
-#: Share of the examples that may end with a SolveError.
+#: Fraction of the examples that may end with a SolveError.
 MOST_UNSOLVED = 0.01
 #: What is asked for, and how it may be missed besides the flow's own error.
 ASKED = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}

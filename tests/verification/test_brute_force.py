@@ -1,6 +1,6 @@
 """The flows that are given, beside those of a brute force that shares nothing with the program (``brute_force``).
 
-CHUTEFLOW_BRUTE_FORCE sets the share of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners,
+CHUTEFLOW_BRUTE_FORCE sets the fraction of the campaign that is run: 1 for 1,050 chutes and 1,152 questions at corners,
 some 20 minutes.
 """
 
@@ -22,9 +22,9 @@ import pytest
 
 import chuteflow
 from chuteflow import FlowSet, SolveError
-from chuteflow.branches.families import families
+from chuteflow.branches.solution_branches import find_branches
 from chuteflow.steady.model import model
-from chuteflow.trajectories.refining import REFINEMENT, carry_down
+from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
 
 from .brute_force import NEAR, QUANTITIES, BruteForce, Chute, Fineness, Found, balances
 
@@ -73,8 +73,8 @@ def macroscopic(found: FlowSet) -> np.ndarray:
 
 def ask(chute: Chute, name: str, value: float, tally: Tally, **further: Any) -> FlowSet:
     """The answer of the program, with nothing remembered, and its time."""
-    families.cache_clear()
-    carry_down.cache_clear()
+    find_branches.cache_clear()
+    integrate_trajectories.cache_clear()
     condition: dict[str, Any] = {name: value}
     begin = time.process_time()
     try:
@@ -213,7 +213,7 @@ def questions(rng: np.random.Generator, chute: Chute, deep_only: bool) -> Iterat
 
 
 def run(group: str, share: float, seed: int = 14) -> Tally:
-    """A share of one group of chutes."""
+    """A fraction of one group of chutes."""
     sample, number, deep_only = GROUPS[group]
     tally, seen = Tally(), 0
     for i in range(max(1, round(share * number))):
@@ -221,18 +221,18 @@ def run(group: str, share: float, seed: int = 14) -> Tally:
         chute = sample(rng)
         for name, value, expected, deepest in questions(rng, chute, deep_only):
             compare(tally, chute, name, value, deepest, expected)
-        check_families(tally, chute)
+        check_branches(tally, chute)
         print(*(f"{group} {i} {line}\n" for line in tally.wrong[seen:]), sep="", end="", flush=True)
         seen = len(tally.wrong)
     print(group, tally, flush=True)
     return tally
 
 
-def check_families(tally: Tally, chute: Chute) -> None:
+def check_branches(tally: Tally, chute: Chute) -> None:
     """Half of delta gives the same numbers of flows at some hold-ups, unless a fold is near."""
     problem = model(chute_of(chute))
     refinements = [replace(REFINEMENT, delta=share * REFINEMENT.delta) for share in (1.0, 0.5)]
-    grids = [carry_down(problem, 1e-3, 1e5, DEEPEST, refinement) for refinement in refinements]
+    grids = [integrate_trajectories(problem, 1e-3, 1e5, DEEPEST, refinement) for refinement in refinements]
     deepest = min(grid.deepest for grid in grids)
     for mass in np.geomspace(0.01, 0.98, 12) * deepest:
         counts = [
@@ -256,7 +256,7 @@ CORNERS = [
 
 
 def run_corners(share: float) -> Tally:
-    """A share of the questions at corners and edges: answered, and fast."""
+    """A fraction of the questions at corners and edges: answered, and fast."""
     tally = Tally()
     for chute, name, value in CORNERS[:: max(1, round(1.0 / share))]:
         tally.questions += 1

@@ -23,7 +23,7 @@ FLOWS: dict[str, tuple[Case, dict[str, Any], int]] = {
     "very cold": (Case(0.3, 0.8, 0.8, 0.6), {"T_surface": 1e-2}, 0),
     "very hot": (Case(0.3, 0.8, 0.8, 0.6), {"T_surface": 1e4}, 0),
 }
-#: Fields are compared to this share of their largest value.
+#: Fields are compared to this fraction of their largest value.
 CLOSE = 1e-8
 
 

@@ -11,17 +11,17 @@ from typing import Any, overload
 import numpy as np
 
 from chuteflow import display
-from chuteflow.bifurcations import seeds
+from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
-from chuteflow.bifurcations.system import Sweep
-from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, traced
-from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import Range
+from chuteflow.bifurcations.system import SecondParameter
+from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, trace_boundary
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import LineOfFlows, Searched
+from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control
+from chuteflow.numerics.continuation import ContinuationSettings
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
@@ -33,10 +33,10 @@ from chuteflow.theory.constitutive import require_limit
 from chuteflow.threads import on_one_thread
 
 #: What can be followed.
-KINDS = seeds.KINDS
-#: Values of the parameter at which boundaries are entered, unless another number is asked for.
+KINDS = starting_points.KINDS
+#: Values of the parameter at which boundaries are entered, by default.
 SAMPLES = 13
-#: A value at which families cannot be told apart is moved by so many spacings, in turn.
+#: A value at which branches cannot be distinguished is moved by so many spacings, in turn.
 _ASIDE = (0.0, 0.07, -0.11)
 
 
@@ -107,11 +107,11 @@ class BoundarySet(Result, Sequence[Boundary]):
 
     ``chute`` gives the other parameters; ``bounds`` is the range of the ``second``, ``sampled`` the values of it at
     which boundaries were entered, and ``families`` those of the flows there. ``skipped`` are the values at which
-    families could not be told apart. ``reason`` says why there is none.
+    branches could not be distinguished. ``reason`` says why there is none.
 
-    Complete is this: every boundary is found that passes a sampled value on a family in the range searched, and
-    is followed from end to end. One that begins and ends between two sampled values is looked for from both,
-    where flows come nearest to it; it could be missed if neither shows a sign of it, as where a whole family
+    Complete is this: every boundary is found that passes a sampled value on a branch in the range searched, and
+    is followed from end to end. One that begins and ends between two sampled values is searched for from both,
+    where flows come nearest to it; it could be missed if neither shows a sign of it, as where a whole branch
     of flows exists between them alone.
     """
 
@@ -121,7 +121,7 @@ class BoundarySet(Result, Sequence[Boundary]):
     bounds: tuple[float, float]
     boundaries: tuple[Boundary, ...]
     sampled: tuple[float, ...]
-    families: tuple[tuple[TracedFamily, ...], ...] = field(repr=False, compare=False)
+    families: tuple[tuple[TracedBranch, ...], ...] = field(repr=False, compare=False)
     skipped: tuple[float, ...]
     searched: Searched
     tolerance: float
@@ -144,7 +144,7 @@ class BoundarySet(Result, Sequence[Boundary]):
     @cached_property
     def incomplete(self) -> str | None:
         """Which flows boundaries were not followed among, in words; None where there are none."""
-        solutions = (solution for families in self.families for family in families for solution in family.solutions)
+        solutions = (solution for branches in self.families for branch in branches for solution in branch.solutions)
         if not any(crossings(solution.elements).size for solution in solutions):
             return None
         return (
@@ -194,8 +194,8 @@ def boundary(
     tolerance: float = TOLERANCE,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
-    control: Control = CONTROL,
-    progress: Callable[[str, float], object] = lambda what, share: None,
+    control: ContinuationSettings = CONTROL,
+    progress: Callable[[str, float], object] = lambda what, fraction: None,
 ) -> BoundarySet:
     """Follow every boundary of a kind over a range of a second parameter, through its turning points.
 
@@ -204,13 +204,13 @@ def boundary(
         of: what to follow, one of KINDS: a fold, the onset of density inversion, or a change of interior.
         second: "slope", "restitution", "wall_restitution" or "roughness".
         bounds: the range of the second parameter.
-        samples: values of it, evenly over the range, at which all families of flows are searched for points of
+        samples: values of it, evenly over the range, at which all branches of flows are searched for points of
             boundaries, and for signs of boundaries beside them; each is then followed over the whole range, once.
         tolerance: relative error allowed in Q, h, M and the second parameter, from 1e-11 to 1e-3.
         surface_temperature: range of T_surface.
         largest_holdup: largest M.
         control: steps of the continuation.
-        progress: called with what is being done and the share of the range that is done.
+        progress: called with what is being done and the fraction of the range that is done.
 
     Raises:
         InputError: for an unknown kind or parameter, or a range or number out of bounds.
@@ -219,40 +219,40 @@ def boundary(
     sweep = _checked(chute, of, second, bounds)
     samples = whole("samples", samples, 2, 1000)
     tolerance = checked_tolerance(tolerance)
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
-    entered: list[tuple[TracedFamily, ...]] = []
+    entered: list[tuple[TracedBranch, ...]] = []
     skipped: list[float] = []
 
-    def follow(points: Iterator[BoundaryPoint], share: float) -> None:
+    def follow(points: Iterator[BoundaryPoint], fraction: float) -> None:
         for point in points:
             inside = within.contains(point.flow.solution.macroscopic)
             if inside and not any(other.holds(point) for other in found):
-                notice = partial(progress, "following", share)
-                line = traced(point, within, tolerance, control, notice)
-                # A point that could not be told from those of a known line has led to it once more.
+                notice = partial(progress, "following", fraction)
+                line = trace_boundary(point, within, tolerance, control, notice)
+                # A point that could not be distinguished from those of a known line has led to it again.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]
 
     values = np.linspace(sweep.low, sweep.high, samples).tolist()
     spacing = (sweep.high - sweep.low) / (samples - 1)
     for i, value in enumerate(values):
-        share = i / samples
-        progress("searching", share)
-        families, value = _families(sweep, value, spacing, within)
-        if families is None:
+        fraction = i / samples
+        progress("searching", fraction)
+        branches, value = _branches_at(sweep, value, spacing, within)
+        if branches is None:
             skipped.append(value)
             continue
         sampled.append(value)
-        entered.append(tuple(families))
-        for condition in seeds.conditions(of):
-            follow(seeds.on_families(sweep, condition, value, families, spacing, tolerance), share)
-    for condition in seeds.conditions(of):
+        entered.append(tuple(branches))
+        for condition in starting_points.make_test_functions(of):
+            follow(starting_points.find_on_branches(sweep, condition, value, branches, spacing, tolerance), fraction)
+    for condition in starting_points.make_test_functions(of):
         for low, high in pairwise(values):
-            for value in seeds.whatever_the_flow(sweep, condition, low, high):
-                families = seeds.families_at(sweep, value, within)
-                follow(seeds.along_families(sweep, condition, value, families, tolerance), 1.0)
+            for value in starting_points.find_values_for_all_flows(sweep, condition, low, high):
+                branches = starting_points.trace_branches_at(sweep, value, within)
+                follow(starting_points.find_along_branches(sweep, condition, value, branches, tolerance), 1.0)
     boundaries = sorted((as_boundary(of, second, b) for b in found), key=lambda b: -len(b.flows))
     return BoundarySet(
         chute=chute,
@@ -265,17 +265,17 @@ def boundary(
         skipped=tuple(skipped),
         searched=Searched((within.coldest, within.hottest), within.deepest),
         tolerance=tolerance,
-        reason=None if boundaries else f"no family of flows in the range searched has a point of the kind {of}",
+        reason=None if boundaries else f"no branch of flows in the range searched has a point of the kind {of}",
     )
 
 
-def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> Sweep:
+def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> SecondParameter:
     if of not in KINDS:
         raise InputError(f"cannot follow {of!r}: choose one of {', '.join(KINDS)}")
     if second not in PARAMETERS:
         raise InputError(f"unknown second parameter {second!r}: choose one of {', '.join(PARAMETERS)}")
     low, high = pair("bounds", bounds)
-    sweep = Sweep(chute, second, low, high)
+    sweep = SecondParameter(chute, second, low, high)
     for value in (low, high):
         end = sweep.chute_at(value)  # which says what is allowed
         if end.surface == "free":
@@ -285,12 +285,14 @@ def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) ->
     return sweep
 
 
-def _families(sweep: Sweep, value: float, spacing: float, within: Range) -> tuple[list[TracedFamily] | None, float]:
-    """The families of flows at a value of the parameter, or close by where they cannot be told apart just there."""
+def _branches_at(
+    sweep: SecondParameter, value: float, spacing: float, within: SearchRange
+) -> tuple[list[TracedBranch] | None, float]:
+    """The branches of flows at a value of the parameter, or close by where they cannot be distinguished just there."""
     for aside in _ASIDE:
         beside = float(np.clip(value + aside * spacing, sweep.low, sweep.high))
         try:
-            return seeds.families_at(sweep, beside, within), beside
+            return starting_points.trace_branches_at(sweep, beside, within), beside
         except SolveError:
             continue
     return None, value

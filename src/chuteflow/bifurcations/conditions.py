@@ -1,11 +1,11 @@
-"""Which flows of a family lie on a boundary: scalar conditions with their exact derivatives.
+"""Which flows of a branch lie on a boundary: scalar conditions with their exact derivatives.
 
 # notation: z unknowns of a flow (n+3,), lambda the second parameter, F(z, lambda) = 0 the steady problem,
 # m a macroscopic quantity, eps a step along the imaginary axis.
 
-A condition is a number G(z, lambda) that vanishes on the boundary and is defined off it and off the family too.
+A condition is a number G(z, lambda) that vanishes on the boundary and is defined off it and off the branch too.
 
-**Folds.** The quantity m turns along a family where the square matrix A = [F_z; m_z] is singular. With fixed
+**Folds.** The quantity m turns along a branch where the square matrix A = [F_z; m_z] is singular. With fixed
 borders b and c near its null vectors, G and the vectors v and w solve
 
     [A b; c' 0] [v; G] = [0; 1],      [A' c; b' 0] [w; G] = [0; 1],
@@ -13,7 +13,7 @@ borders b and c near its null vectors, G and the vectors v and w solve
 and dG = -w' dA v (A. Griewank and G. W. Reddien 1984, SIAM J. Numer. Anal. 21, 176-185; W. Govaerts 2000,
 Numerical Methods for Bifurcations of Dynamical Equilibria). Since A holds first derivatives, dA v with
 respect to z is the derivative along v of w' A: one evaluation at z + i eps v, exact to rounding. A stays singular
-where a family is born as a point or exchanges its ends with another (F_z loses rank there), and is singular
+where a branch begins as a point or exchanges its ends with another (F_z loses rank there), and is singular
 there for every m: such points are regular points of the curve G = 0.
 """
 
@@ -30,7 +30,7 @@ from chuteflow.numerics.newton import solve_each
 from chuteflow.steady.collocation import Collocation, State
 from chuteflow.steady.model import LOSS, WORK
 
-#: Degree of the grid on which the largest of a field is looked for, if it is finer than the solution's.
+#: Degree of the grid on which the largest of a field is searched for, if it is finer than the solution's.
 _SAMPLES = 96
 #: Borders are renewed where the null vectors, of length 1 along them, are longer.
 _TURNED = 1.5
@@ -39,7 +39,7 @@ _STEPS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Local:
+class Linearisation:
     """The steady problem at one point: the ``state`` at (z, lambda), that at (z, lambda + i eps), F and its
     derivatives ``by_z`` (n+2, n+3) and ``by_parameter`` (n+2,)."""
 
@@ -51,33 +51,33 @@ class Local:
     by_parameter: Array
 
     @classmethod
-    def at(cls, problem: Collocation, stepped: Collocation, z: Array) -> Local:
+    def at(cls, problem: Collocation, stepped: Collocation, z: Array) -> Linearisation:
         """Evaluate ``problem``, and ``stepped``, which is the same an imaginary step of the parameter further."""
         state, beyond = problem.state(z), stepped.state(z)
         return cls(z, state, beyond, state.residual(), state.jacobian(), derivative(beyond.residual()))
 
 
-class Condition(Protocol):
-    """A condition as it is evaluated along a boundary, and before that along a family of flows."""
+class TestFunction(Protocol):
+    """A condition as it is evaluated along a boundary, and before that along a branch of flows."""
 
     @property
     def turns(self) -> bool:
-        """Whether the boundary is where what :meth:`along_family` gives turns; else it is where that vanishes."""
+        """Whether the boundary is where what :meth:`along_branch` gives turns; else it is where that vanishes."""
         ...
 
-    def along_family(self, at: Local) -> tuple[float, Array]:
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
         """A function of the flow, and its gradient in z (n+3,)."""
         ...
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
         """G, its gradient in z (n+3,), and its derivative with respect to the parameter."""
         ...
 
-    def suits(self, at: Local) -> bool:
+    def suits(self, at: Linearisation) -> bool:
         """Whether it is made for this grid, and well conditioned here."""
         ...
 
-    def based(self, at: Local) -> Condition:
+    def based(self, at: Linearisation) -> TestFunction:
         """The same condition, made for this grid and place."""
         ...
 
@@ -94,12 +94,12 @@ class Fold:
     right: Array = field(default_factory=lambda: np.empty(0))
     turns = True
 
-    def along_family(self, at: Local) -> tuple[float, Array]:
-        """See :class:`Condition`."""
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
+        """See :class:`TestFunction`."""
         return float(at.state.macroscopic()[self.which]), at.state.macroscopic_gradient()[self.which]
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
-        """See :class:`Condition`."""
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
+        """See :class:`TestFunction`."""
         g, v, w = self._solved(at)
         which = self.which
         aside = along(at, v)
@@ -107,25 +107,25 @@ class Fold:
         by_parameter = w @ _bordered(at.stepped.jacobian(), at.stepped.macroscopic_gradient()[which]) @ v
         return g, -derivative(by_z), -float(derivative(by_parameter))
 
-    def suits(self, at: Local) -> bool:
-        """See :class:`Condition`."""
+    def suits(self, at: Linearisation) -> bool:
+        """See :class:`TestFunction`."""
         if len(self.left) != len(at.z):
             return False
         _, v, w = self._solved(at)
         return max(float(np.linalg.norm(v)), float(np.linalg.norm(w))) < _TURNED
 
-    def based(self, at: Local) -> Fold:
-        """See :class:`Condition`."""
+    def based(self, at: Linearisation) -> Fold:
+        """See :class:`TestFunction`."""
         # The best borders are the singular vectors of the least singular value.
         u, _, v = np.linalg.svd(_bordered(at.by_z, at.state.macroscopic_gradient()[self.which]))
         return Fold(self.which, u[:, -1], v[-1])
 
-    def pivot(self, at: Local) -> float:
-        """Share of the gradient of the quantity in the left null vector: 0 where the family itself is singular."""
+    def pivot(self, at: Linearisation) -> float:
+        """Fraction of the gradient of the quantity in the left null vector: 0 where the branch itself is singular."""
         _, _, w = self._solved(at)
         return abs(float(w[-1])) / float(np.linalg.norm(w))
 
-    def _solved(self, at: Local) -> tuple[float, Array, Array]:
+    def _solved(self, at: Linearisation) -> tuple[float, Array, Array]:
         n = len(self.left)
         matrix = np.zeros((n + 1, n + 1))
         matrix[:n, :n] = _bordered(at.by_z, at.state.macroscopic_gradient()[self.which])
@@ -142,22 +142,22 @@ class _OfFields:
 
     turns = False
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
-        """See :class:`Condition`."""
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
+        """See :class:`TestFunction`."""
         raise NotImplementedError
 
-    def along_family(self, at: Local) -> tuple[float, Array]:
-        """See :class:`Condition`."""
+    def along_branch(self, at: Linearisation) -> tuple[float, Array]:
+        """See :class:`TestFunction`."""
         value, gradient, _ = self(at)
         return value, gradient
 
-    def suits(self, at: Local) -> bool:
-        """See :class:`Condition`."""
+    def suits(self, at: Linearisation) -> bool:
+        """See :class:`TestFunction`."""
         del at
         return True
 
-    def based(self, at: Local) -> Self:
-        """See :class:`Condition`."""
+    def based(self, at: Linearisation) -> Self:
+        """See :class:`TestFunction`."""
         del at
         return self
 
@@ -169,21 +169,21 @@ class Inversion(_OfFields):
     d ln x/d ln p = 1 - p dtheta/dp, and the density rises with x.
     """
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
-        """See :class:`Condition`."""
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
+        """See :class:`TestFunction`."""
         state = at.state
         row = _largest(state.problem.grid, state.rise)
         nodes = np.arange(len(row))
         by_z = np.zeros((len(row), len(row) + 2))
         by_z[nodes, nodes] = state.p / state.mass
-        by_z[:, -1] = (state.laden - 1.0) * state.rise
+        by_z[:, -1] = (state.overburden_fraction - 1.0) * state.rise
         # Where a largest value lies inside, moving the place changes nothing to first order.
         return float(row @ state.rise) - 1.0, row @ by_z, 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class InteriorChange(_OfFields):
-    """Change of interior: dissipation less production, over nu p sqrt(T), is 0 where it is least or ``largest``.
+    """Change of interior: dissipation minus production, over nu p sqrt(T), is 0 where it is least or ``largest``.
 
     The flow turns mixed there: from dissipative where the least falls below 0, from productive where the largest
     rises above it. The place is the densest, or one inside, or the surface; where it passes from one of the first
@@ -192,31 +192,33 @@ class InteriorChange(_OfFields):
 
     largest: bool
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
-        """See :class:`Condition`."""
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
+        """See :class:`TestFunction`."""
         state = at.state
         row = _largest(state.problem.grid, state.net_loss if self.largest else -state.net_loss)
         by_log_x = row * (state.df[LOSS] - state.problem.model.slope**2 * state.df[WORK])
-        by_z = np.concatenate([-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.laden]])
+        by_z = np.concatenate(
+            [-by_log_x @ state.problem.accumulate, [-by_log_x.sum(), by_log_x @ state.overburden_fraction]]
+        )
         return float(row @ state.net_loss), by_z, float(row @ derivative(at.stepped.net_loss))
 
 
 @dataclass(frozen=True, eq=False)
-class Held(_OfFields):
+class FixedQuantity(_OfFields):
     """The macroscopic quantity ``which``, a logarithm, has a ``value``."""
 
     which: int
     value: float
 
-    def __call__(self, at: Local) -> tuple[float, Array, float]:
-        """See :class:`Condition`."""
+    def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
+        """See :class:`TestFunction`."""
         which = self.which
         by_parameter = float(derivative(at.stepped.macroscopic()[which]))
         off = float(at.state.macroscopic()[which]) - self.value
         return off, at.state.macroscopic_gradient()[which], by_parameter
 
 
-def along(at: Local, direction: Array) -> State:
+def along(at: Linearisation, direction: Array) -> State:
     """The state an imaginary step along a direction (n+3,) of the unknowns: see
     :mod:`chuteflow.numerics.complex_step`."""
     return at.state.problem.state(cast("Array", stepped(at.z, direction)))

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet
-from chuteflow.bifurcations.regions import count, limits, sides
-from chuteflow.bifurcations.seeds import FOLDS
+from chuteflow.bifurcations.regions import count_flows, find_kinds_beside, find_range_edges
+from chuteflow.bifurcations.starting_points import FOLDS
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.quantities import PLACE
 
 #: Kinds of flows are told beside this fraction of the length of a boundary.
 _FRACTION = 0.45
-#: Regions are told apart on so many cells by as many, and counted if a circle of so many cells fits in.
+#: Regions are distinguished on so many cells by as many, and counted if a circle of so many cells fits in.
 _CELLS, _FITTING = 300, 7.0
 #: Room around the boundaries, as a fraction of their extent.
 _MARGIN = 0.03
@@ -28,7 +28,7 @@ _ASPECT = 0.8
 
 
 @dataclass(frozen=True)
-class Frame:
+class DiagramFrame:
     """A rectangle of the second parameter, ``x``, and a quantity, ``y``, which may be on a logarithmic axis."""
 
     x: tuple[float, float]
@@ -36,7 +36,7 @@ class Frame:
     logarithmic: bool
 
     @classmethod
-    def around(cls, x: Array, y: Array, bounds: tuple[float, float]) -> Frame:
+    def around(cls, x: Array, y: Array, bounds: tuple[float, float]) -> DiagramFrame:
         """The frame of points, within ``bounds`` of the second parameter: nothing is known beyond."""
         logarithmic = bool(y.min() > 0.0 and y.max() > _SPAN * y.min())
         low, high = _widened(np.log(y) if logarithmic else y)
@@ -61,7 +61,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Region:
+class CountedRegion:
     """A region between boundaries by a point in it: how many flows share the quantity there."""
 
     parameter: float
@@ -70,7 +70,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Sides:
+class KindsBeside:
     """The kinds of flows at smaller and larger parameters beside point ``index`` of a boundary."""
 
     boundary: Boundary
@@ -87,10 +87,10 @@ class Diagram:
 
     found: BoundarySet
     quantity: str
-    frame: Frame
+    frame: DiagramFrame
     edges: tuple[Boundary, ...]
-    regions: tuple[Region, ...]
-    sides: tuple[Sides, ...]
+    regions: tuple[CountedRegion, ...]
+    sides: tuple[KindsBeside, ...]
 
 
 def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
@@ -100,8 +100,8 @@ def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
         SolveError: where the edge of the range searched could not be followed, or a flow not be solved.
     """
     lines = [(boundary.parameter, getattr(boundary, quantity)) for boundary in found]
-    frame = Frame.around(*(np.concatenate(part) for part in zip(*lines, strict=True)), bounds=found.bounds)
-    edges = limits(found) if FOLDS.get(found.kind) == PLACE.index(quantity) else []
+    frame = DiagramFrame.around(*(np.concatenate(part) for part in zip(*lines, strict=True)), bounds=found.bounds)
+    edges = find_range_edges(found) if FOLDS.get(found.kind) == PLACE.index(quantity) else []
     lines += [(edge.parameter, getattr(edge, quantity)) for edge in edges]
     regions = _regions(found, frame, lines) if edges else ()
     return Diagram(found, quantity, frame, tuple(edges), tuple(regions), tuple(_sides(found, frame, quantity)))
@@ -110,11 +110,11 @@ def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
 def _widened(values: Array) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     # One value alone has some extent on an axis too.
-    room = _MARGIN * (high - low) or _MARGIN * max(abs(low), 1e-9)
-    return low - room, high + room
+    margin = _MARGIN * (high - low) or _MARGIN * max(abs(low), 1e-9)
+    return low - margin, high + margin
 
 
-def _regions(found: BoundarySet, frame: Frame, lines: Sequence[tuple[Array, Array]]) -> Iterator[Region]:
+def _regions(found: BoundarySet, frame: DiagramFrame, lines: Sequence[tuple[Array, Array]]) -> Iterator[CountedRegion]:
     """Every region between ``lines``, by its place farthest from them all, if another place of it confirms the number
     of flows."""
     from scipy.ndimage import distance_transform_edt, label
@@ -132,9 +132,9 @@ def _regions(found: BoundarySet, frame: Frame, lines: Sequence[tuple[Array, Arra
         away = np.hypot(*(np.indices(depth.shape) - np.reshape(place, (2, 1, 1))))
         other = np.unravel_index(int(np.argmax(away * (depth >= 0.5 * _FITTING))), depth.shape)
         here, there = (frame.point(*_middle(cell)) for cell in (place, other))
-        counted = count(found, *here)
-        if counted == count(found, *there):
-            yield Region(*here, counted)
+        counted = count_flows(found, *here)
+        if counted == count_flows(found, *there):
+            yield CountedRegion(*here, counted)
 
 
 def _cells(places: Array) -> Array:
@@ -152,12 +152,12 @@ def _middle(cell: tuple[Any, ...]) -> tuple[float, float]:
     return float(across), float(up)
 
 
-def _sides(found: BoundarySet, frame: Frame, quantity: str) -> Iterator[Sides]:
+def _sides(found: BoundarySet, frame: DiagramFrame, quantity: str) -> Iterator[KindsBeside]:
     """The kinds of flows beside each boundary, a little before its middle."""
     for boundary in found:
         places = frame.fractions(boundary.parameter, getattr(boundary, quantity)) * (1.0, _ASPECT)
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
         index = int(np.clip(np.searchsorted(length, _FRACTION * length[-1]), 1, len(length) - 2))
-        kinds = sides(boundary, PLACE.index(quantity), index)
+        kinds = find_kinds_beside(boundary, PLACE.index(quantity), index)
         if kinds is not None:
-            yield Sides(boundary, index, kinds)
+            yield KindsBeside(boundary, index, kinds)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from chuteflow.bifurcations.points import BoundaryPoint, solved
+from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
 from chuteflow.bifurcations.system import BoundarySystem
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Point
+from chuteflow.numerics.continuation import CurvePoint
 from chuteflow.steady.collocation import LOG_M, LOG_T
 
 #: A flow has vanished where its hold-up is below this part of the surface temperature, and of 1.
@@ -22,8 +22,8 @@ _REACHED, _ADJUSTED = 1e-12, 4
 _LEADING = ((2, 1.0), (2, -1.0), (0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))
 
 
-def left(
-    before: Point[BoundarySystem], point: Point[BoundarySystem], within: Range, tolerance: float
+def find_exit(
+    before: CurvePoint[BoundarySystem], point: CurvePoint[BoundarySystem], within: SearchRange, tolerance: float
 ) -> tuple[BoundaryPoint | None, str] | None:
     """The point at which a step leaves the range, if it is not the one before, and in words how; None inside.
 
@@ -34,25 +34,25 @@ def left(
     passed = np.flatnonzero(ended > 0.0)
     if not len(passed):
         return None
-    shares = np.minimum(begun[passed], 0.0) / (np.minimum(begun[passed], 0.0) - ended[passed])
-    share, edge = float(shares.min()), int(passed[np.argmin(shares)])
+    fractions = np.minimum(begun[passed], 0.0) / (np.minimum(begun[passed], 0.0) - ended[passed])
+    fraction, edge = float(fractions.min()), int(passed[np.argmin(fractions)])
     words = _words(point.system, within)[edge]
     if begun[edge] > -_REACHED:
         return None, words
     unknown, sign = _LEADING[edge]
-    start = before.z + share * (point.z - before.z)
+    start = before.z + fraction * (point.z - before.z)
     target = float(start[unknown - 3])
-    there = solved(point.system, start, np.eye(3)[unknown], target, tolerance)
+    there = solve_boundary_point(point.system, start, np.eye(3)[unknown], target, tolerance)
     for _ in range(_ADJUSTED):
         off = float(_excesses(there.system, there.w, within)[edge])
         if abs(off) < _REACHED:
             break
         target -= sign * off
-        there = solved(point.system, start, np.eye(3)[unknown], target, tolerance)
+        there = solve_boundary_point(point.system, start, np.eye(3)[unknown], target, tolerance)
     return there, words
 
 
-def _excesses(system: BoundarySystem, w: Array, within: Range) -> Array:
+def _excesses(system: BoundarySystem, w: Array, within: SearchRange) -> Array:
     """How far a flow lies beyond each edge, in the parameter or a logarithm: negative within the range."""
     value, sweep = float(w[-1]), system.sweep
     here = system.problem(value).state(w[:-1]).macroscopic()
@@ -68,7 +68,7 @@ def _excesses(system: BoundarySystem, w: Array, within: Range) -> Array:
     )
 
 
-def _words(system: BoundarySystem, within: Range) -> tuple[str, ...]:
+def _words(system: BoundarySystem, within: SearchRange) -> tuple[str, ...]:
     sweep = system.sweep
     return (
         f"{sweep.name} = {sweep.high:g} is the end of its range",

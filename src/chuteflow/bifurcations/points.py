@@ -17,7 +17,7 @@ from chuteflow.numerics.newton import newton, solve_each
 from chuteflow.steady.collocation import LOG_T
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.solver import Solution, Status, prolong
+from chuteflow.steady.solver import Solution, SolverStatus, prolong
 
 #: Newton's method on a grid ends with a step below this, after which the next one would be below rounding.
 _STEP = 1e-7
@@ -41,7 +41,7 @@ class BoundaryPoint:
         return float(self.w[-1])
 
 
-def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance: float) -> BoundaryPoint:
+def solve_boundary_point(system: BoundarySystem, w: Array, row: Array, value: float, tolerance: float) -> BoundaryPoint:
     """The point of the boundary near ``w`` whose last three unknowns have the product ``value`` with ``row`` (3,).
 
     Newton's method converges on one grid and takes one more step on the next finer one, until the change of
@@ -56,17 +56,17 @@ def solved(system: BoundarySystem, w: Array, row: Array, value: float, tolerance
         if not result.converged:
             raise SolveError("a point of a boundary could not be solved: narrow the range searched")
         coarse = _quantities(system, result.z)
-        system, w = finer(system, result.z, finer_degrees.pop(0))
+        system, w = refine_grid(system, result.z, finer_degrees.pop(0))
         residual, jacobian = _bordered(system, w, row, value)
         w = w - solve_each(jacobian, residual)
         change = float(np.abs(_quantities(system, w) - coarse).max())
         noise = _noise(system, w, jacobian)
         if change < max(tolerance, noise):
-            return as_point(system, w, max(change, noise))
+            return make_point(system, w, max(change, noise))
     raise SolveError("the finest grid did not reach the tolerance: ask for a larger tolerance")
 
 
-def shift(system: BoundarySystem, w: Array, row: Array) -> float:
+def estimate_shift(system: BoundarySystem, w: Array, row: Array) -> float:
     """How far the parameter is from the boundary, by the first step of Newton's method in the plane across ``row``
     (3,) through ``w``; infinitely far where the parameter has no say in it."""
     residual, jacobian = _bordered(system, w, row, float(row @ w[-3:]))
@@ -74,26 +74,27 @@ def shift(system: BoundarySystem, w: Array, row: Array) -> float:
     return far if np.isfinite(far) else np.inf
 
 
-def through(system: BoundarySystem, w: Array, tolerance: float) -> BoundaryPoint:
-    """The point of the boundary next to ``w``: in the plane through it across the boundary; see :func:`solved`."""
+def solve_across(system: BoundarySystem, w: Array, tolerance: float) -> BoundaryPoint:
+    """The point of the boundary next to ``w``: in the plane through it across the boundary; see
+    :func:`solve_boundary_point`."""
     row = (system.weights * system.tangent(w))[-3:]
-    return solved(system, w, row, float(row @ w[-3:]), tolerance)
+    return solve_boundary_point(system, w, row, float(row @ w[-3:]), tolerance)
 
 
-def finer(system: BoundarySystem, w: Array, degree: int) -> tuple[BoundarySystem, Array]:
+def refine_grid(system: BoundarySystem, w: Array, degree: int) -> tuple[BoundarySystem, Array]:
     """The system and a point of it on the grid of another degree."""
     problem, z = prolong(system.problem(float(w[-1])), w[:-1], degree)
     w = np.append(z, w[-1])
     return system.moved(problem, w), w
 
 
-def as_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
+def make_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     """The point of the boundary with solved unknowns ``w``."""
     chute = system.sweep.chute_at(float(w[-1]))
     problem = system.problem(float(w[-1]))
     problem = replace(problem, model=replace(problem.model, chute=chute))
     z = w[:-1]
-    solution = Solution(problem.state(z).macroscopic(), error, Status.CONVERGED, (problem, z))
+    solution = Solution(problem.state(z).macroscopic(), error, SolverStatus.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 
 

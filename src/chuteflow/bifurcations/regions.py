@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet, as_boundary
-from chuteflow.bifurcations.conditions import Held, InteriorChange, Inversion
-from chuteflow.bifurcations.points import BoundaryPoint, solved
-from chuteflow.bifurcations.seeds import FOLDS, HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.bifurcations.tracing import TracedBoundary, traced
+from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inversion
+from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
+from chuteflow.bifurcations.starting_points import FOLDS, HELD
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
+from chuteflow.bifurcations.tracing import TracedBoundary, trace_boundary
 from chuteflow.branches.enumeration import flows
-from chuteflow.branches.families import TracedFamily
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import solve_each
@@ -26,13 +26,13 @@ from chuteflow.steady.solver import Solution
 
 #: The argument of :func:`chuteflow.flows` that holds the quantity which folds.
 _ARGUMENTS = {"fold-Q": "Q", "fold-M": "M", "fold-T": "T_surface"}
-#: A family ends at an edge of the range if it comes as near to it in the logarithm.
+#: A branch ends at an edge of the range if it comes as near to it in the logarithm.
 _AT_EDGE = 1e-6
 #: A limit of the range is followed as far beyond it as this factor, for it to be inside.
 _BEYOND = 10.0
 
 
-def count(found: BoundarySet, value: float, quantity: float) -> int:
+def count_flows(found: BoundarySet, value: float, quantity: float) -> int:
     """How many flows there are in the range searched at a ``value`` of the second parameter, which share one value
     of the quantity whose folds ``found`` are.
 
@@ -52,42 +52,42 @@ def count(found: BoundarySet, value: float, quantity: float) -> int:
     return len(flows(chute, **which, **ranges))
 
 
-def limits(found: BoundarySet) -> list[Boundary]:
-    """The edges of the range searched, as far as families of flows end there: the flows of the largest and smallest
+def find_range_edges(found: BoundarySet) -> list[Boundary]:
+    """The edges of the range searched, as far as branches of flows end there: the flows of the largest and smallest
     surface temperature and of the largest hold-up, followed through the second parameter.
 
     Raises:
         SolveError: where one could not be followed.
     """
-    sweep = Sweep(found.chute, found.second, *found.bounds)
-    within = Range.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
+    sweep = SecondParameter(found.chute, found.second, *found.bounds)
+    within = SearchRange.checked(found.searched.surface_temperature, found.searched.largest_holdup, found.chute.surface)
     edges = (
-        (Held(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
-        (Held(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
-        (Held(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
+        (FixedQuantity(LOG_T, float(np.log(within.hottest))), replace(within, hottest=_BEYOND * within.hottest)),
+        (FixedQuantity(LOG_T, float(np.log(within.coldest))), replace(within, coldest=within.coldest / _BEYOND)),
+        (FixedQuantity(LOG_M, float(np.log(within.deepest))), replace(within, deepest=_BEYOND * within.deepest)),
     )
     out: list[Boundary] = []
     for condition, wider in edges:
         lines: list[TracedBoundary] = []
-        for value, families in zip(found.sampled, found.families, strict=True):
-            for solution in _ends(families, condition):
+        for value, branches in zip(found.sampled, found.families, strict=True):
+            for solution in _ends(branches, condition):
                 w = np.append(solution.z, value)
                 system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-                point = solved(system, w, HELD, value, found.tolerance)
+                point = solve_boundary_point(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
-                    lines.append(traced(point, wider, found.tolerance))
+                    lines.append(trace_boundary(point, wider, found.tolerance))
         out += [as_boundary("limit", found.second, line) for line in lines]
     return out
 
 
-def _ends(families: tuple[TracedFamily, ...], condition: Held) -> Iterator[Solution]:
-    for family in families:
-        for solution in (family.solutions[0], family.solutions[-1]):
+def _ends(branches: tuple[TracedBranch, ...], condition: FixedQuantity) -> Iterator[Solution]:
+    for branch in branches:
+        for solution in (branch.solutions[0], branch.solutions[-1]):
             if abs(float(solution.macroscopic[condition.which]) - condition.value) < _AT_EDGE:
                 yield solution
 
 
-def sides(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
+def find_kinds_beside(boundary: Boundary, which: int, index: int) -> tuple[str, str] | None:
     """The kinds of the flows at smaller and at larger values of the second parameter, beside point ``index`` of a
     boundary, with the quantity ``which`` held; None for folds, and where that quantity has a fold itself."""
     point: BoundaryPoint = boundary.traced.points[index]

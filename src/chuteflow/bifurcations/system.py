@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Local
+from chuteflow.bifurcations.conditions import Linearisation, TestFunction
 from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import Collocation
@@ -33,7 +33,7 @@ _STRETCH_OFF = 0.3
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SecondParameter:
     """The second parameter of a chute: its ``name`` in Chute, and the range ``low`` to ``high``."""
 
     chute: Chute
@@ -55,13 +55,13 @@ class Sweep:
         return replace(self.chute, **{self.name: min(max(value, self.low), self.high)})
 
     def allows(self, value: float) -> bool:
-        """Whether the equations are asked for: within the range, or a little beyond it."""
+        """Whether the equations are requested: within the range, or a little beyond it."""
         margin = min(0.1 * (self.high - self.low), 0.5 * self.low if self.low > 0.0 else np.inf)
         return self.low - margin <= value <= self.high + margin
 
 
 @lru_cache(maxsize=4)
-def _models(sweep: Sweep, registered: Law, value: float) -> tuple[Model, Model]:
+def _models(sweep: SecondParameter, registered: Law, value: float) -> tuple[Model, Model]:
     del registered  # known here to tell what is remembered of one law from that of another
     return model_along(sweep.chute, sweep.name, value)
 
@@ -75,8 +75,8 @@ class BoundarySystem:
     much as a factor of e^6 in T_surface or M.
     """
 
-    sweep: Sweep
-    condition: Condition
+    sweep: SecondParameter
+    condition: TestFunction
     degree: int
     stretch: float
 
@@ -91,11 +91,11 @@ class BoundarySystem:
         """The steady problem at a value of the parameter."""
         return Collocation(self.sweep.models(value)[0], self.degree, self.stretch)
 
-    def local(self, w: Array) -> Local:
+    def local(self, w: Array) -> Linearisation:
         """Everything at the unknowns ``w`` (n+4,)."""
         here, beyond = self.sweep.models(float(w[-1]))
         stepped = Collocation(beyond, self.degree, self.stretch)
-        return Local.at(Collocation(here, self.degree, self.stretch), stepped, w[:-1])
+        return Linearisation.at(Collocation(here, self.degree, self.stretch), stepped, w[:-1])
 
     def residual_and_jacobian(self, w: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""

@@ -3,55 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Fold, InteriorChange, Local, along
-from chuteflow.bifurcations.edges import left
-from chuteflow.bifurcations.points import BoundaryPoint, as_point, finer, solved
-from chuteflow.bifurcations.seeds import HELD
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.branches.ranges import Range
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
+from chuteflow.bifurcations.edges import find_exit
+from chuteflow.bifurcations.points import BoundaryPoint, make_point, refine_grid, solve_boundary_point
+from chuteflow.bifurcations.starting_points import HELD
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative
-from chuteflow.numerics.continuation import Control, Point, Status, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, locate, trace
+from chuteflow.numerics.following import Event, Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.elements import DEGREES
 
 #: How boundaries are followed, in the inner product of BoundarySystem.
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000)
+CONTROL = ContinuationSettings(
+    initial_step=0.05, min_step=1e-6, max_step=0.25, max_angle=0.2, tolerance=1e-9, max_points=2000
+)
 #: A boundary is closed where it passes its start within this part of the step, in about its direction.
 _CLOSE, _ALONG = 0.05, 0.9
-#: Below this share of the quantity in the null vector, the family itself is singular.
+#: Below this fraction of the quantity in the null vector, the branch itself is singular.
 _SINGULAR = 1e-5
-#: A point is looked for on a chord if it lies within this many of its lengths beside it, and is the same if
+#: A point is searched for on a chord if it lies within this many of its lengths beside it, and is the same if
 #: ln Q, ln h, ln M and ln T_surface agree to this.
 _BESIDE, _SAME = 0.3, 1e-6
 #: To tell whether points are the same they are solved to this; where even that fails, what lies within this part of a
 #: chord's length beside it is on the line; and so many points of a line tell whether it is a known one.
-_TOLD, _ON_CHORD, _TELLING = 1e-7, 1e-3, 5
+_ROUGHLY, _ON_CHORD, _SAMPLED = 1e-7, 1e-3, 5
 #: The place of a blunt turn may scatter by so much.
 _BLUNT = 1e-6
 #: A parameter that changes less, per arclength, does not change.
 _NO_RATE = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """A turning point in the second parameter: its ``kind``, one of TURNS, and the index of the point before it."""
-
-    kind: str
-    point: BoundaryPoint
-    position: int
-
-
 #: Kinds of turning points, and what they are.
 TURNS = {
     "cusp": "two folds meet: three flows become one",
-    "birth": "a closed family of flows shrinks to a point",
-    "crossing": "two families of flows meet and exchange their ends",
+    "birth": "a closed branch of flows shrinks to a point",
+    "crossing": "two branches of flows meet and exchange their ends",
     "turn": "the boundary turns back in the parameter",
 }
 
@@ -60,9 +54,9 @@ TURNS = {
 class TracedBoundary:
     """A boundary as far as it goes within its range: points in order, turns, and in words why it ends."""
 
-    sweep: Sweep
+    sweep: SecondParameter
     points: tuple[BoundaryPoint, ...]
-    turns: tuple[Turn, ...]
+    turns: tuple[Event[BoundaryPoint], ...]
     ends: tuple[str, str]
 
     def holds(self, point: BoundaryPoint) -> bool:
@@ -79,8 +73,8 @@ class TracedBoundary:
 
     def repeats(self, other: TracedBoundary) -> bool:
         """Whether this is a part of another boundary, or the whole of it."""
-        some = np.linspace(0, len(self.points) - 1, _TELLING + 2)[1:-1].round().astype(int)
-        return sum(other.holds(self.points[i]) for i in some.tolist()) > _TELLING // 2
+        some = np.linspace(0, len(self.points) - 1, _SAMPLED + 2)[1:-1].round().astype(int)
+        return sum(other.holds(self.points[i]) for i in some.tolist()) > _SAMPLED // 2
 
     def at(self, value: float, tolerance: float) -> list[BoundaryPoint]:
         """The points at which the parameter has a ``value``, in order.
@@ -96,9 +90,9 @@ class TracedBoundary:
         out = []
         for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0)).tolist():
             one, other = stops[i][1], stops[i + 1][1]
-            share = off[i] / (off[i] - off[i + 1])
-            w = one.w + share * (_carried(other.w, other.system, one.system) - one.w)
-            out.append(solved(one.system, w, HELD, value, tolerance))
+            fraction = off[i] / (off[i] - off[i + 1])
+            w = one.w + fraction * (_carried(other.w, other.system, one.system) - one.w)
+            out.append(solve_boundary_point(one.system, w, HELD, value, tolerance))
         return out
 
     def _meets(self, i: int, sigma: float, point: BoundaryPoint, close: bool) -> bool:
@@ -107,7 +101,7 @@ class TracedBoundary:
         system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
-            there = solved(system, w, row, float(row @ point.w[-3:]), _TOLD)
+            there = solve_boundary_point(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
         except SolveError:
             return close
         gap = there.flow.solution.macroscopic - point.flow.solution.macroscopic
@@ -117,21 +111,11 @@ class TracedBoundary:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)
 
 
-@dataclass(eq=False)
-class _Side:
-    """What one side of a boundary is made of, from the start outwards."""
-
-    points: list[BoundaryPoint] = field(default_factory=list)
-    turns: list[Turn] = field(default_factory=list)
-    end: str = ""
-    closed: bool = False
-
-
-def traced(
+def trace_boundary(
     start: BoundaryPoint,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
     notice: Callable[[], object] = lambda: None,
 ) -> TracedBoundary:
     """The boundary through ``start`` to both sides; ``notice`` is called at each point.
@@ -140,82 +124,76 @@ def traced(
         SolveError: where the start could not be carried on.
     """
     tangent = start.system.tangent(start.w)
-    sweep = start.system.sweep
-    onward = _side(start, tangent, within, tolerance, control, notice)
-    if onward.closed:
-        points = (*onward.points, onward.points[0])
-        return TracedBoundary(sweep, points, tuple(onward.turns), (onward.end, onward.end))
-    back = _side(start, -tangent, within, tolerance, control, notice)
-    last = len(back.points) - 1
-    turns = [Turn(t.kind, t.point, last - 1 - t.position) for t in reversed(back.turns)]
-    turns += [Turn(t.kind, t.point, last + t.position) for t in onward.turns]
-    points = (*back.points[:0:-1], *onward.points)
-    return TracedBoundary(sweep, points, tuple(turns), (back.end, onward.end))
+    found = follow_both_sides(lambda sign: _side(start, sign * tangent, within, tolerance, control, notice))
+    return TracedBoundary(start.system.sweep, found.points, found.events, found.ends)
 
 
 def _side(
     start: BoundaryPoint,
     tangent: Array,
-    within: Range,
+    within: SearchRange,
     tolerance: float,
-    control: Control,
+    control: ContinuationSettings,
     notice: Callable[[], object],
-) -> _Side:
-    side = _Side([start])
+) -> Side[BoundaryPoint]:
     system = start.system
     path = trace(system, start.w, direction=system.weights * tangent, control=control)
-    first = before = next(path, None)
-    for point in path:
+    first: list[CurvePoint[BoundarySystem]] = []
+
+    def extend(
+        side: Side[BoundaryPoint], before: CurvePoint[BoundarySystem] | None, point: CurvePoint[BoundarySystem]
+    ) -> None:
+        if before is None:
+            first.append(point)
+            return
         notice()
-        if point.step == 0.0 or first is None or before is None:
-            before = point  # the same point on another grid, or with other borders
-            continue
+        if point.step == 0.0:
+            return  # the same point on another grid, or with other borders
         try:
-            ended = _extended(side, first, before, point, within, tolerance)
+            _extend(side, first[0], before, point, within, tolerance)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
-            side.end, ended = "it is lost in rounding a little further on", True
-        if ended:
-            return side
-        before = point
-    corner = path.status is Status.SHARP_TURN and isinstance(system.condition, InteriorChange)
-    side.end = "the change goes over to another place in the flow, at a corner" if corner else path.status.value
+            side.stop("it is lost in rounding a little further on")
+
+    side = follow_side(path, Side(start), extend)
+    if path.status is ContinuationStatus.SHARP_TURN and isinstance(system.condition, InteriorChange):
+        side.stop("the change goes over to another place in the flow, at a corner")
     return side
 
 
-def _extended(
-    side: _Side,
-    first: Point[BoundarySystem],
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
-    within: Range,
+def _extend(
+    side: Side[BoundaryPoint],
+    first: CurvePoint[BoundarySystem],
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
+    within: SearchRange,
     tolerance: float,
-) -> bool:
-    """Add what a step leads to, and tell whether the side ends there.
+) -> None:
+    """Add what a step leads to, and stop the side where it leaves the range or closes.
 
     Raises:
         SolveError: where a point or turning point could not be solved to ``tolerance``.
     """
-    edge = left(before, point, within, tolerance)
+    edge = find_exit(before, point, within, tolerance)
     if edge is not None:
-        reached, side.end = edge
+        reached, end = edge
         if reached is not None:
-            _note_turn(side, before, point, tolerance, reached)
-            side.points.append(reached)
-        return True
-    _note_turn(side, before, point, tolerance)
+            _add_turn(side, before, point, tolerance, reached)
+            side.add(reached)
+        side.stop(end)
+        return
+    _add_turn(side, before, point, tolerance)
     if len(side.points) > 3 and _returned(first, before, point):
-        side.end, side.closed = "the boundary closes on itself", True
-        return True
+        side.stop("the boundary closes on itself", closed=True)
+        return
     row = (point.system.weights * point.tangent)[-3:]
-    side.points.append(solved(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
-    return False
+    side.add(solve_boundary_point(point.system, point.z, row, float(row @ point.z[-3:]), tolerance))
 
 
-def _note_turn(
-    side: _Side,
-    before: Point[BoundarySystem],
-    point: Point[BoundarySystem],
+def _add_turn(
+    side: Side[BoundaryPoint],
+    before: CurvePoint[BoundarySystem],
+    point: CurvePoint[BoundarySystem],
     tolerance: float,
     last: BoundaryPoint | None = None,
 ) -> None:
@@ -229,16 +207,16 @@ def _note_turn(
         row = before.system.weights[-3:] * (point.z - before.z)[-3:]
         if row @ turn.w[-3:] > row @ last.w[-3:]:
             return
-    side.turns.append(Turn(_kind(turn), turn, len(side.points) - 1))
+    side.add(turn, _kind(turn))
 
 
-def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) -> BoundaryPoint:
+def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], tolerance: float) -> BoundaryPoint:
     """The turning point between two points, on finer grids until it stays where it is."""
     before, settled = np.full(3, np.inf), np.inf
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
         if degree > a.system.degree:
-            system, w = finer(a.system, a.z, degree)
-            a, b = _corrected(system, w, a), _corrected(system, finer(b.system, b.z, degree)[1], b)
+            system, w = refine_grid(a.system, a.z, degree)
+            a, b = _corrected(system, w, a), _corrected(system, refine_grid(b.system, b.z, degree)[1], b)
         if a.tangent[-1] * b.tangent[-1] >= 0.0:
             raise SolveError("a turning point of a boundary is not there on a finer grid")
         located = locate(a, b, a.system, lambda z, tangent, system: float(tangent[-1]))
@@ -250,12 +228,12 @@ def _turn(a: Point[BoundarySystem], b: Point[BoundarySystem], tolerance: float) 
         scattered = settled < _BLUNT and change > 0.5 * settled
         error = max(change, located.error, settled if scattered else 0.0)
         if scattered or change < max(tolerance, located.error):
-            return as_point(a.system, located.point.z, error)
+            return make_point(a.system, located.point.z, error)
         before, settled = place, change
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 
 
-def _corrected(system: BoundarySystem, w: Array, near: Point[BoundarySystem]) -> Point[BoundarySystem]:
+def _corrected(system: BoundarySystem, w: Array, near: CurvePoint[BoundarySystem]) -> CurvePoint[BoundarySystem]:
     """A point of another grid that lies where ``near`` does."""
     direction = np.zeros_like(w)
     direction[-3:] = (near.system.weights * near.tangent)[-3:]
@@ -276,7 +254,7 @@ def _kind(point: BoundaryPoint) -> str:
     return "birth" if _definite(at) else "crossing"
 
 
-def _definite(at: Local) -> bool:
+def _definite(at: Linearisation) -> bool:
     """Whether the parameter has an extremum on the surface of flows over (z, lambda), where F_z loses rank.
 
     Its Hessian on the null space of F_z is that of -psi' F, with psi the left null vector.
@@ -288,16 +266,18 @@ def _definite(at: Local) -> bool:
     return bool(np.linalg.det(hessian) > 0.0)
 
 
-def _returned(first: Point[BoundarySystem], before: Point[BoundarySystem], last: Point[BoundarySystem]) -> bool:
+def _returned(
+    first: CurvePoint[BoundarySystem], before: CurvePoint[BoundarySystem], last: CurvePoint[BoundarySystem]
+) -> bool:
     """Whether the last step passed the first point, in its direction, as far as the last three unknowns show."""
     root = np.sqrt(last.system.weights[-3:])
     a, b, c = (root * p.z[-3:] for p in (first, before, last))
     step = c - b
-    share = float((a - b) @ step) / float(step @ step)
-    beside = float(np.linalg.norm(b + share * step - a)) / float(np.linalg.norm(step))
+    fraction = float((a - b) @ step) / float(step @ step)
+    beside = float(np.linalg.norm(b + fraction * step - a)) / float(np.linalg.norm(step))
     headings = [root * p.tangent[-3:] for p in (first, last)]
     cosine = float(headings[0] @ headings[1]) / float(np.prod([np.linalg.norm(h) for h in headings]))
-    return 0.0 <= share < 1.0 and beside < _CLOSE and cosine > _ALONG
+    return 0.0 <= fraction < 1.0 and beside < _CLOSE and cosine > _ALONG
 
 
 def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.branches.families import trace_all
 from chuteflow.branches.lines import SteadyBranch
-from chuteflow.branches.ranges import BranchEnd, Range
+from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Branch, Curve
+from chuteflow.branches.solution_branches import trace_all
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_Q
@@ -19,7 +19,7 @@ from chuteflow.steady.model import Model
 
 
 @dataclass(frozen=True)
-class Count:
+class FlowCount:
     """So many ``flows`` at every mass flux from ``low`` to ``high``; ``at_least`` so many where a branch leaves the
     range searched, or is lost, on its way to these fluxes. ``low`` may be 0, and ``high`` infinite."""
 
@@ -29,7 +29,7 @@ class Count:
     at_least: bool
 
 
-def flux_counts(curve: Curve) -> list[Count]:
+def flux_counts(curve: Curve) -> list[FlowCount]:
     """The numbers of flows that share one mass flux, from the smallest flux to the largest, without gaps.
 
     Their edges are the folds and the ends of the branches.
@@ -37,13 +37,13 @@ def flux_counts(curve: Curve) -> list[Count]:
     stretches = [stretch for branch in curve.branches for stretch in _monotonic(branch)]
     rays = [ray for branch in curve.branches for ray in _beyond(branch)]
     edges = sorted({0.0, np.inf, *(edge for stretch in stretches for edge in stretch)})
-    counts: list[Count] = []
+    counts: list[FlowCount] = []
     for low, high in pairwise(edges):
         flows = sum(first <= low and high <= last for first, last in stretches)
         at_least = any(first <= low and high <= last for first, last in rays)
         if counts and (counts[-1].flows, counts[-1].at_least) == (flows, at_least):
             low = counts.pop().low
-        counts.append(Count(low, high, flows, at_least))
+        counts.append(FlowCount(low, high, flows, at_least))
     return counts
 
 
@@ -53,27 +53,27 @@ def flows_at_flux(branches: Iterable[SteadyBranch], mass_flux: float) -> int:
 
 
 def most_at_once(stretches: Array, apart: float = 0.0) -> int:
-    """The largest number of ``stretches`` (k, 2), each from a lower to a higher value, that share a value, where those
-    that overlap by no more than ``apart`` do not count as sharing one."""
+    """The largest number of ``stretches`` (k, 2), each from a lower to a higher value, that share a value, where
+    those that overlap by no more than ``apart`` do not count as sharing one."""
     low, high = stretches.T
     edges = np.concatenate([low + apart, high])
     order = np.lexsort((np.repeat([1, 0], len(low)), edges))
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def most_solved(problem: Model, within: Range, tolerance: float) -> int | None:
+def most_solved(problem: Model, within: SearchRange, tolerance: float) -> int | None:
     """The largest number of flows in a range that share one mass flux, by branches solved from end to end; None where
     one of them could not be followed."""
     try:
-        families, lost = trace_all(problem, within, tolerance)
+        branches, lost = trace_all(problem, within, tolerance)
         stops = [
-            [family.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), family.macroscopic[-1, LOG_Q]]
-            for family in families
-            for turning in [family.turns(LOG_Q, tolerance)]
+            [branch.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), branch.macroscopic[-1, LOG_Q]]
+            for branch in branches
+            for turning in [branch.turns(LOG_Q, tolerance)]
         ]
     except SolveError:
         return None
-    if lost or any(BranchEnd.LOST in family.ends for family in families):
+    if lost or any(BranchEnd.LOST in branch.ends for branch in branches):
         return None
     stretches = [sorted(pair) for along in stops for pair in pairwise(along)]
     return most_at_once(np.array(stretches)) if stretches else 0

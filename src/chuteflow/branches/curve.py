@@ -11,12 +11,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from chuteflow.branches.existence import imbalance
-from chuteflow.branches.families import TracedFamily, doubt, search, searched, trace_all
-from chuteflow.branches.paths import Chord, Point, find_zero
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.existence import explain_imbalance
+from chuteflow.branches.paths import Chord, PathPoint, find_zero
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
-from chuteflow.branches.rough_turns import dips
+from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.branches.solution_branches import (
+    TracedBranch,
+    describe_search,
+    explain_incompleteness,
+    search_range,
+    trace_all,
+)
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
@@ -48,7 +54,7 @@ def curve(
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
 ) -> Curve:
-    """Every family of steady flows on ``chute`` in a range.
+    """Every branch of steady flows on ``chute`` in a range.
 
     Args:
         chute: the chute.
@@ -60,50 +66,50 @@ def curve(
 
     Raises:
         InputError: for a range or number out of bounds.
-        SolveError: where a family could not be followed. Where flows of one could not be solved to the tolerance,
+        SolveError: where a branch could not be followed. Where flows of one could not be solved to the tolerance,
             its branch ends, and says why.
     """
     points = whole("points", points, 2, 100_000)
     tolerance = checked_tolerance(tolerance)
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
     found, lost = trace_all(problem, within, tolerance)
-    grid = search(problem, within)
-    longest = max((float(family.arclength[-1]) for family in found), default=1.0)
+    grid = search_range(problem, within)
+    longest = max((float(branch.arclength[-1]) for branch in found), default=1.0)
     doubts: list[str] = []
     branches = [
-        _branch(chute, family, _samples(family, points, float(family.arclength[-1]) / longest), tolerance, doubts)
-        for family in found
+        _branch(chute, branch, _samples(branch, points, float(branch.arclength[-1]) / longest), tolerance, doubts)
+        for branch in found
     ]
     branches.sort(key=lambda branch: -float(branch.surface_temperature.max()))
     return Curve(
         chute=chute,
         branches=tuple(branches),
-        searched=searched(within, grid),
+        searched=describe_search(within, grid),
         tolerance=tolerance,
-        reason=None if branches else imbalance(problem),
-        incomplete=next(iter(doubts), None) or doubt(grid, within, lost, ("a family", "families")),
+        reason=None if branches else explain_imbalance(problem),
+        incomplete=next(iter(doubts), None) or explain_incompleteness(grid, within, lost, ("a branch", "branches")),
     )
 
 
-def _samples(family: TracedFamily, points: int, fraction: float) -> int:
+def _samples(branch: TracedBranch, points: int, fraction: float) -> int:
     """Flows of a branch whose length is a ``fraction`` of the longest: as even as those of that one, and, up to
     ``points``, no fewer than it takes to draw its turns."""
-    return max(8, round(points * fraction), min(points, len(family.points)))
+    return max(8, round(points * fraction), min(points, len(branch.points)))
 
 
-def _branch(chute: Chute, family: TracedFamily, count: int, tolerance: float, doubts: list[str]) -> Branch:
-    places = np.linspace(0.0, family.arclength[-1], count)
-    solutions = [point.solution for point in family.at(places, tolerance)]
+def _branch(chute: Chute, branch: TracedBranch, count: int, tolerance: float, doubts: list[str]) -> Branch:
+    places = np.linspace(0.0, branch.arclength[-1], count)
+    solutions = [point.solution for point in branch.at(places, tolerance)]
     located: list[tuple[str, Flow, float]] = []
     for locate in (_folds, _changes):
         try:
-            located += locate(chute, family, tolerance)
+            located += locate(chute, branch, tolerance)
         except SolveError:
             # One point that is not found must not cost the curve.
-            low, high = np.exp(np.sort(family.macroscopic[[0, -1], LOG_M]))
-            doubts.append(f"not all special points of the family from M = {low:.4g} to {high:.4g} could be located")
-    ends, heading = family.ends, 1.0
+            low, high = np.exp(np.sort(branch.macroscopic[[0, -1], LOG_M]))
+            doubts.append(f"not all special points of the branch from M = {low:.4g} to {high:.4g} could be located")
+    ends, heading = branch.ends, 1.0
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
         solutions, ends, heading = solutions[::-1], (ends[1], ends[0]), -1.0
         places = places[::-1]
@@ -115,27 +121,27 @@ def _branch(chute: Chute, family: TracedFamily, count: int, tolerance: float, do
     return Branch(tuple(flows), tuple(special), ends)
 
 
-def _folds(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
+def _folds(chute: Chute, branch: TracedBranch, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which Q, M or T_surface turns, with their arclengths."""
-    at = family.arclength
+    at = branch.arclength
     for kind, which in _FOLDS.items():
-        for turn in family.turns(which, tolerance):
+        for turn in branch.turns(which, tolerance):
             yield kind, Flow(chute, turn.point.solution), float(np.interp(turn.place, np.arange(len(at)), at))
 
 
-def _changes(chute: Chute, family: TracedFamily, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
+def _changes(chute: Chute, branch: TracedBranch, tolerance: float) -> Iterator[tuple[str, Flow, float]]:
     """Flows at which the density turns inverted, or the interior another kind, with their arclengths."""
-    points, at = family.points, family.arclength
+    points, at = branch.points, branch.arclength
     rough = rough_kinds([point.solution for point in points])
     for column, (kind, quantity) in enumerate(_CHANGES):
         # What is near to zero is told by the flow itself.
         values = rough[:, column].copy()
         for i in np.flatnonzero(np.abs(values) < _UNSURE).tolist():
             values[i] = quantity(Flow(chute, points[i].solution))
-        # The slopes are rough: what comes as near to zero as half of its way there is looked at.
+        # The slopes are rough: what comes as near to zero as half of its way there is examined.
         ways = {
             d.step: d
-            for d in dips(values, at)
+            for d in find_extrema(values, at)
             if abs(d.value) < 0.5 * max(np.abs(values[d.step : d.step + 2])) or d.zeros
         }
         for i in range(len(points) - 1):
@@ -155,7 +161,7 @@ def _of_flow(chute: Chute, quantity: Callable[[Flow], float]) -> Callable[[Solut
 
 def _pair(
     chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float], fraction: float
-) -> list[tuple[float, Point]]:
+) -> list[tuple[float, PathPoint]]:
     """The two zeros to either side of a fraction of a chord, if the sign is another one there."""
     middle = chord.at(fraction)
     if middle is None:

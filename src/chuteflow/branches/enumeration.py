@@ -1,7 +1,7 @@
 """Every steady flow of a chute at a given flux, hold-up, centre of mass or surface temperature.
 
 The branches of flows come from the grid of trajectories (:mod:`chuteflow.trajectories.refining`). Along each, the flows
-that meet the condition are where the quantity takes its value (:mod:`chuteflow.branches.families`).
+that meet the condition are where the quantity takes its value (:mod:`chuteflow.branches.solution_branches`).
 """
 
 from __future__ import annotations
@@ -12,10 +12,17 @@ from typing import Any, TypeAlias, overload
 
 import numpy as np
 
-from chuteflow.branches.existence import reason_for_none
-from chuteflow.branches.families import Family, crossings, doubt, families, search, searched
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.existence import explain_none_found
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import FlowSet, FlowSets
+from chuteflow.branches.solution_branches import (
+    SolutionBranch,
+    describe_search,
+    explain_incompleteness,
+    find_branches,
+    search_range,
+    solve_crossings,
+)
 from chuteflow.checks import number, real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -32,7 +39,7 @@ from chuteflow.trajectories.refining import TrajectoryGrid
 Values: TypeAlias = Sequence[float] | Array
 
 _EXTENSIONS = 4
-#: A family leads out of the range towards a value if the quantity rises at least with this power there.
+#: A branch leads out of the range towards a value if the quantity rises at least with this power there.
 _LEADS = 0.25
 #: The range is not extended to larger hold-ups where there are more branches: their number would grow.
 _MOST_DEEPER = 4
@@ -90,8 +97,8 @@ def flows(
         h: centre of mass (3.27).
         T_surface: granular temperature far above (half-line) or at the interface.
         tolerance: relative error allowed in Q, h and M, from 1e-11 to 1e-3.
-        surface_temperature: range searched. It is extended where a family of flows leads out of it towards
-            the value asked for; the range that was searched in the end is part of the result.
+        surface_temperature: range searched. It is extended where a branch of flows leads out of it towards
+            the requested value; the range that was searched in the end is part of the result.
         largest_holdup: range searched, extended in the same way.
 
     Raises:
@@ -99,21 +106,21 @@ def flows(
     """
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     named = [(name, value) for name, value in given.items() if isinstance(value, list | tuple | np.ndarray)]
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     if not named or np.ndim(named[0][1]) == 0:
-        return flows_within(chute, *asked(given), tolerance, within)
+        return flows_within(chute, *check_condition(given), tolerance, within)
     name, several = named[0]
     values = real_array(name, several)
     if values.ndim > 1:
         raise InputError(f"{name}: must be a number or a one-dimensional array of some")
     each = [{**given, name: value} for value in values.tolist()]
-    sets = tuple(flows_within(chute, *asked(one), tolerance, within) for one in each)
+    sets = tuple(flows_within(chute, *check_condition(one), tolerance, within) for one in each)
     return FlowSets(chute, name, tuple(values.tolist()), sets)
 
 
 @on_one_thread
 @np.errstate(under="ignore")
-def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: Range) -> FlowSet:
+def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> FlowSet:
     """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
     tolerance = checked_tolerance(tolerance)
     if which in (LOG_T, LOG_M):
@@ -131,42 +138,42 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
-        searched=searched(found.within, found.grid),
+        searched=describe_search(found.within, found.grid),
         tolerance=tolerance,
         reason=None
         if found.solutions
-        else reason_for_none(problem, [f.macroscopic for f in found.families], which, value, found.within),
+        else explain_none_found(problem, [f.macroscopic for f in found.branches], which, value, found.within),
         incomplete=_left_out(found, which, value),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _BranchSearch:
     """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
     rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
 
-    within: Range
-    families: tuple[Family, ...]
+    within: SearchRange
+    branches: tuple[SolutionBranch, ...]
     solutions: list[Solution]
     beyond: list[Solution]
     lost: list[Array]
     grid: TrajectoryGrid
 
 
-def _search(problem: Model, which: int, value: float, tolerance: float, within: Range) -> _Search:
-    found = families(problem, within)
+def _search(problem: Model, which: int, value: float, tolerance: float, within: SearchRange) -> _BranchSearch:
+    found = find_branches(problem, within)
     solutions: list[Solution] = []
     lost: list[Array] = []
-    for family in found:
-        solved, missed = crossings(family, which, value, tolerance)
+    for branch in found:
+        solved, missed = solve_crossings(branch, which, value, tolerance)
         solutions += solved
         lost += missed
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _Search(within, found, inside, beyond, lost, search(problem, within))
+    return _BranchSearch(within, found, inside, beyond, lost, search_range(problem, within))
 
 
-def asked(given: Mapping[str, Any]) -> tuple[int, float]:
+def check_condition(given: Mapping[str, Any]) -> tuple[int, float]:
     """The place of the one quantity that is given among the macroscopic ones, and its value.
 
     Raises:
@@ -182,8 +189,8 @@ def asked(given: Mapping[str, Any]) -> tuple[int, float]:
 
 
 @dataclass(frozen=True)
-class _Lead:
-    """Where a family leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
+class _Extrapolation:
+    """Where a branch leads out of the range towards a value: past the lower or upper ``edge`` (-1 or 1) of an ``axis``,
     LOG_T or LOG_M, there to reach the value at about ``place``, a logarithm."""
 
     axis: int
@@ -191,10 +198,10 @@ class _Lead:
     place: float
 
 
-def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
+def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapolation]:
     target = float(np.log(value))
-    for family in search.families:
-        m = family.macroscopic
+    for branch in search.branches:
+        m = branch.macroscopic
         for end, before in ((m[0], m[1]), (m[-1], m[-2])) if len(m) > 1 else ():
             left = target - float(end[which])
             for axis in (LOG_T, LOG_M):
@@ -202,12 +209,12 @@ def _leads(search: _Search, which: int, value: float) -> Iterator[_Lead]:
                 run = float(end[axis] - before[axis])
                 slope = float(end[which] - before[which]) / run if run else 0.0
                 if edge and run * edge > 0.0 and slope * np.sign(left) * edge > _LEADS:
-                    yield _Lead(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
+                    yield _Extrapolation(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
 
 
-def _left_out(found: _Search, which: int, value: float) -> str | None:
+def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = doubt(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
+    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
     if left is not None:
         return left
     for lead in _leads(found, which, value):
@@ -221,10 +228,10 @@ def _left_out(found: _Search, which: int, value: float) -> str | None:
     return None
 
 
-def _wider(found: _Search, which: int, value: float) -> Range:
+def _wider(found: _BranchSearch, which: int, value: float) -> SearchRange:
     """The range with which branches that lead out of it towards ``value`` reach it."""
     within = wider = found.within
-    axes = (LOG_T, LOG_M) if len(found.families) <= _MOST_DEEPER else (LOG_T,)
+    axes = (LOG_T, LOG_M) if len(found.branches) <= _MOST_DEEPER else (LOG_T,)
     for lead in _leads(found, which, value):
         if lead.axis in axes:
             wider = wider.reaching(lead.axis, float(np.exp(np.clip(lead.place, -600.0, 600.0))))
@@ -239,7 +246,7 @@ def _wider(found: _Search, which: int, value: float) -> Range:
 
 
 def _distinct(solutions: list[Solution], which: int) -> list[Solution]:
-    """Without repetitions, hot to cold, then by hold-up; surface temperatures that were asked for are one."""
+    """Without repetitions, hot to cold, then by hold-up; surface temperatures that were requested are one."""
     kept: list[Solution] = []
     for s in solutions:
         if all(np.abs(s.macroscopic - k.macroscopic).max() > _SAME + s.error + k.error for k in kept):

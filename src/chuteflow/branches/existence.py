@@ -1,4 +1,4 @@
-"""Why there is no flow: where energy cannot balance, or where the families that exist do not lead.
+"""Why there is no flow: where energy cannot balance, or where the branches that exist do not lead.
 
 # notation: y = q/(p sqrt(T)) heat flux, base(nu) the flux that the base gives, net = loss - s^2 work.
 """
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.model import LOSS, WORK, Model
 from chuteflow.theory.bases import BASES
@@ -19,17 +19,17 @@ _NAMES = ("Q", "h", "M", "T_surface")
 _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
 
 
-def reason_for_none(model: Model, families: Sequence[Array], which: int, value: float, within: Range) -> str:
-    """One sentence on why no flow was found, given the quantities (k, 4) of the families that were."""
-    if families:
-        spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in families]
+def explain_none_found(model: Model, branches: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
+    """One sentence on why no flow was found, given the quantities (k, 4) of the branches that were."""
+    if branches:
+        spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in branches]
         ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
         return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"
-    return f"{imbalance(model)} ({_searched(within)})"
+    return f"{explain_imbalance(model)} ({_searched(within)})"
 
 
-def imbalance(model: Model) -> str:
+def explain_imbalance(model: Model) -> str:
     """What keeps energy from balancing on a chute without flows."""
     chute = model.chute
     f, _ = model.closures(_DENSITIES)
@@ -41,8 +41,8 @@ def imbalance(model: Model) -> str:
     if net.max() <= 0.0 and base.min() >= 0.0:
         if chute.restitution == 1.0:
             return (
-                "elastic grains lose no energy inside, so that only flows are left whose base takes it, "
-                "and this base gives energy at every density: lower e_w or the slope"
+                "elastic grains lose no energy inside, so that only flows with a base that takes energy "
+                "remain, and this base gives energy at every density: lower e_w or the slope"
             )
         return "base and interior both gain energy at every density: nothing takes it away"
     if model.beta != 0.0 or model.base != BASES["richman"]:
@@ -62,7 +62,7 @@ def imbalance(model: Model) -> str:
     return "no flow balances the energy gained and lost"
 
 
-def _searched(within: Range) -> str:
+def _searched(within: SearchRange) -> str:
     return (
         f"searched: surface temperatures {within.coldest:.3g} to {within.hottest:.3g}, hold-ups to {within.deepest:.3g}"
     )

@@ -26,7 +26,7 @@ F = TypeVar("F", bound=SteadyFlow, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Point(Generic[F]):
+class LinePoint(Generic[F]):
     """A flow of a branch; ``special`` is the kind of a special point, or empty."""
 
     flow: F
@@ -34,39 +34,39 @@ class Point(Generic[F]):
 
 
 @overload
-def in_order(branch: Branch) -> Iterator[Point[Flow]]: ...
+def in_order(branch: Branch) -> Iterator[LinePoint[Flow]]: ...
 @overload
-def in_order(branch: SteadyBranch) -> Iterator[Point[SteadyFlow]]: ...
-def in_order(branch: SteadyBranch) -> Iterator[Point[SteadyFlow]]:
+def in_order(branch: SteadyBranch) -> Iterator[LinePoint[SteadyFlow]]: ...
+def in_order(branch: SteadyBranch) -> Iterator[LinePoint[SteadyFlow]]:
     """The flows of ``branch`` with its special points in their places."""
     for i, flow in enumerate(branch.flows):
-        yield Point(flow)
+        yield LinePoint(flow)
         for special in branch.special:
             if special.position == i:
-                yield Point(special.flow, special.kind)
+                yield LinePoint(special.flow, special.kind)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class DensityRun:
     """Consecutive flows of one kind of ``density``; neighbouring runs share the flow where they meet."""
 
     density: str
     flows: tuple[SteadyFlow, ...]
 
 
-def runs(branch: SteadyBranch) -> list[Run]:
+def runs(branch: SteadyBranch) -> list[DensityRun]:
     """``branch`` cut where the density turns from monotonic to inverted or back."""
     kind = branch.flows[0].density
-    found: list[Run] = []
+    found: list[DensityRun] = []
     current: list[SteadyFlow] = []
     for point in in_order(branch):
         current.append(point.flow)
         turns = point.special == "density-inversion"
         if turns or (not point.special and point.flow.density != kind):
-            found.append(Run(kind, tuple(current)))
+            found.append(DensityRun(kind, tuple(current)))
             kind = {INVERTED: MONOTONIC, MONOTONIC: INVERTED}[kind] if turns else point.flow.density
             current = [point.flow]
-    return [*found, Run(kind, tuple(current))]
+    return [*found, DensityRun(kind, tuple(current))]
 
 
 def smooth(flows: Sequence[SteadyFlow]) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chuteflow import display
-from chuteflow.branches.enumeration import asked, flows_within
-from chuteflow.branches.families import families, search
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.enumeration import check_condition, flows_within
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import find_branches, search_range
 from chuteflow.errors import ChuteflowError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE, Parameter
@@ -87,13 +87,13 @@ def nearest(
     """
     given = {"Q": Q, "M": M, "h": h, "T_surface": T_surface}
     condition = {name: value for name, value in given.items() if value is not None}
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
-    looked_for = _LookedFor(within)
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
+    looked_for = _Target(within)
     quantity = near = None
     if condition:
         (quantity,) = condition
-        which, value = asked(given)
-        looked_for = _LookedFor(within.restricted(which, value), which, value)
+        which, value = check_condition(given)
+        looked_for = _Target(within.restricted(which, value), which, value)
         near = _nearest_value(chute, which, value, within)
     found: dict[str, float | None] = {}
     examined: dict[str, tuple[float, float]] = {}
@@ -103,10 +103,10 @@ def nearest(
 
 
 @dataclass(frozen=True)
-class _LookedFor:
+class _Target:
     """A flow in a range at which the quantity ``which`` has a ``value``, or any where that is None."""
 
-    within: Range
+    within: SearchRange
     which: int = LOG_Q
     value: float | None = None
 
@@ -121,34 +121,34 @@ class _LookedFor:
     def surely_on(self, chute: Chute) -> bool:
         """Whether a flow of ``chute`` is solved that meets it."""
         if self.value is None:
-            return any(family.solved(0, TOLERANCE) for family in families(model(chute), self.within))
+            return any(branch.solved(0, TOLERANCE) for branch in find_branches(model(chute), self.within))
         return len(flows_within(chute, self.which, self.value, TOLERANCE, self.within)) > 0
 
     def cells(self, chute: Chute) -> int:
         """How many cells the search of ``chute`` looked at."""
         try:
-            return search(model(chute), self.within).cells
+            return search_range(model(chute), self.within).cells
         except ChuteflowError:
             return 0
 
     def _rough(self, chute: Chute) -> list[Array]:
         try:
-            return [family.macroscopic for family in families(model(chute), self.within)]
+            return [branch.macroscopic for branch in find_branches(model(chute), self.within)]
         except ChuteflowError:
             return []  # a chute whose law has no meaning there, or that cannot be searched
 
 
-def _nearest_value(chute: Chute, which: int, value: float, within: Range) -> float | None:
+def _nearest_value(chute: Chute, which: int, value: float, within: SearchRange) -> float | None:
     """The value nearest to ``value`` of the quantity ``which`` at which a flow of the chute itself is solved."""
     target = math.log(value)
     ends = [
-        (abs(float(m[i, which]) - target), family, int(i))
-        for family in families(model(chute), within)
-        for m in (family.macroscopic,)
+        (abs(float(m[i, which]) - target), branch, int(i))
+        for branch in find_branches(model(chute), within)
+        for m in (branch.macroscopic,)
         for i in (np.abs(m[:, which] - target).argmin(),)
     ]
-    for _, family, i in sorted(ends, key=lambda end: end[0]):
-        point = family.solved(i, TOLERANCE)
+    for _, branch, i in sorted(ends, key=lambda end: end[0]):
+        point = branch.solved(i, TOLERANCE)
         if point is not None:
             return float(np.exp(point.m[which]))
     return None
@@ -165,7 +165,7 @@ def _places(parameter: Parameter, start: float) -> list[float]:
     return sorted((p for p in places if p != start), key=lambda p: abs(p - start))
 
 
-def _first(chute: Chute, parameter: Parameter, looked_for: _LookedFor) -> tuple[float | None, tuple[float, float]]:
+def _first(chute: Chute, parameter: Parameter, looked_for: _Target) -> tuple[float | None, tuple[float, float]]:
     """The nearest value of a parameter that has a flow, moved towards the chute as far as it has one, and the smallest
     and largest value examined."""
     examined = [getattr(chute, parameter.name)]
@@ -181,7 +181,7 @@ def _first(chute: Chute, parameter: Parameter, looked_for: _LookedFor) -> tuple[
     return None, (min(examined), max(examined))
 
 
-def _towards(chute: Chute, parameter: Parameter, place: float, looked_for: _LookedFor) -> Iterator[float]:
+def _towards(chute: Chute, parameter: Parameter, place: float, looked_for: _Target) -> Iterator[float]:
     """Where rough flows meet the condition between the chute and ``place``, the nearest first; nothing where not even
     those at ``place`` do."""
     if not looked_for.on(replace(chute, **{parameter.name: place})):

@@ -18,6 +18,7 @@ import numpy as np
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.elements import Elements
+from chuteflow.steady.flow import Flow
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, between, solve
 
 #: Neighbouring points suffice where their tangents differ by less than this angle, and their mean from the chord by
@@ -31,14 +32,15 @@ _CLOSEST, _MOST_BETWEEN = 1e-9, 200
 #: A slope along the branch is known between two points to this fraction of what it changes, before points between them
 #: have shown better, which is trusted down to the second; below the third a change of sign is a single one.
 _UNKNOWN, _SUREST, _KNOWN = 0.5, 1e-3, 0.1
-#: A slope that is smaller, per length, cannot be told from 0; turning points closer than the second are not told apart.
+#: A slope that is smaller, per length, cannot be distinguished from 0; turning points closer than the second are not
+#: distinguished.
 _FLAT, _SHORTEST = 1e-7, 1e-4
 #: Where a quantity takes a value is known when sigma is to this, or the quantity to the second.
 _CLOSE, _ROUNDING = 1e-12, 4e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class PathPoint:
     """A solved flow, and the unit ``tangent`` (4,) of its branch."""
 
     solution: Solution
@@ -49,12 +51,12 @@ class Point:
         """ln Q, ln h, ln M, ln T_surface."""
         return self.solution.macroscopic
 
-    def reversed(self) -> Point:
+    def reversed(self) -> PathPoint:
         """The same with the tangent the other way."""
-        return Point(self.solution, -self.tangent)
+        return PathPoint(self.solution, -self.tangent)
 
 
-def point_at(start: Elements, weights: Array, value: float, tolerance: float) -> Point | None:
+def solve_point(start: Elements, weights: Array, value: float, tolerance: float) -> PathPoint | None:
     """The point near ``start`` whose quantities, times ``weights`` (4,), sum to ``value``; its tangent goes along them.
 
     None where Newton's method finds none.
@@ -63,14 +65,14 @@ def point_at(start: Elements, weights: Array, value: float, tolerance: float) ->
     if not solution.converged or solution.rates is None:
         return None
     length = float(np.linalg.norm(solution.rates))
-    return Point(solution, solution.rates / length) if np.isfinite(length) else None
+    return PathPoint(solution, solution.rates / length) if np.isfinite(length) else None
 
 
-def _point_between(first: Solution, last: Solution, sigma: float, tolerance: float) -> Point | None:
+def _point_between(first: Solution, last: Solution, sigma: float, tolerance: float) -> PathPoint | None:
     chord = last.macroscopic - first.macroscopic
     direction = chord / np.linalg.norm(chord)
     value = float(direction @ (first.macroscopic + sigma * chord))
-    return point_at(between(first, last, sigma), direction, value, tolerance)
+    return solve_point(between(first, last, sigma), direction, value, tolerance)
 
 
 def solve_between(first: Solution, last: Solution, fraction: float, tolerance: float = TOLERANCE) -> Solution:
@@ -86,12 +88,22 @@ def solve_between(first: Solution, last: Solution, fraction: float, tolerance: f
     return point.solution
 
 
+def flow_between(flows: Sequence[Flow], position: float) -> Flow:
+    """The flow at a position between two neighbours of a branch, or a little beyond its ends, counted in ``flows``."""
+    i = int(np.clip(np.floor(position), 0, len(flows) - 2))
+    first, last = flows[i], flows[i + 1]
+    share = position - i
+    if share in (0.0, 1.0):
+        return last if share else first
+    return Flow(first.chute, solve_between(first.solution, last.solution, share))
+
+
 @dataclass(frozen=True, eq=False)
 class Chord:
     """The branch between two of its points."""
 
-    first: Point
-    last: Point
+    first: PathPoint
+    last: PathPoint
     tolerance: float = TOLERANCE
 
     @cached_property
@@ -122,21 +134,21 @@ class Chord:
         aside = float(np.linalg.norm(mean - (mean @ self.direction) * self.direction))
         return bool(one @ two > np.cos(_ANGLE) and mean @ self.direction > np.cos(_ANGLE) and aside < _ASIDE)
 
-    def at(self, sigma: float) -> Point | None:
+    def at(self, sigma: float) -> PathPoint | None:
         """The point in the plane at ``sigma`` normal to the chord; None where none is found."""
         return _point_between(self.first.solution, self.last.solution, sigma, self.tolerance)
 
-    def slope(self, point: Point) -> Array:
+    def slope(self, point: PathPoint) -> Array:
         """Derivatives (4,) of the quantities with respect to sigma at a point, to about 1e-6."""
         return point.tangent * (self.length / float(point.tangent @ self.direction))
 
-    def sharp_slope(self, point: Point) -> Array:
+    def sharp_slope(self, point: PathPoint) -> Array:
         """The same to rounding: at the flow itself, not at the last but one step of Newton's method."""
         found = point.solution.elements.direction(self.direction)
         return self.slope(point) if found is None else found * self.length
 
 
-def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point]:
+def refine_path(points: Sequence[PathPoint], tolerance: float = TOLERANCE) -> list[PathPoint]:
     """The points with as many between them as it takes for each chord to suffice.
 
     Raises:
@@ -160,7 +172,7 @@ def refined(points: Sequence[Point], tolerance: float = TOLERANCE) -> list[Point
     return out
 
 
-def _halfway(chord: Chord) -> Point:
+def _halfway(chord: Chord) -> PathPoint:
     """A point between the ends of a chord."""
     there = chord.first.tangent - chord.last.tangent
     if float(np.linalg.norm(there)) > _OPPOSED:
@@ -171,7 +183,7 @@ def _halfway(chord: Chord) -> Point:
             aside /= width
             start = between(chord.first.solution, chord.last.solution, 0.5)
             value = 0.5 * float(aside @ (chord.first.m + chord.last.m))
-            point = point_at(start, aside, value, chord.tolerance)
+            point = solve_point(start, aside, value, chord.tolerance)
             if point is not None:
                 return point
     for sigma in (0.5, 0.25, 0.75):
@@ -182,33 +194,34 @@ def _halfway(chord: Chord) -> Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class TurningPoint:
     """A point at which the quantity ``which`` turns; ``place`` counts along the path: 2.5 is between points 2 and 3."""
 
     which: int
     place: float
-    point: Point
+    point: PathPoint
 
 
-def turns(points: Sequence[Point], which: int, tolerance: float = TOLERANCE) -> list[Turn]:
+def locate_turning_points(points: Sequence[PathPoint], which: int, tolerance: float = TOLERANCE) -> list[TurningPoint]:
     """The points at which a quantity turns along successive ``points`` that suffice, in order.
 
     Its slope is known exactly at the points. Between two it is a quadratic of them and of the quantity's change, and
-    what that may be wrong by shows where a point is put between. A stretch is halved until the slope has one sign, or
-    a change of sign at its ends and none of its own derivative. Slopes too small to be told from zero turn nothing.
+    what that may be wrong by shows where a point is put between. A stretch is halved until the slope has one sign, or a
+    change of sign at its ends and none of its own derivative. Slopes too small to be distinguished from zero turn
+    nothing.
     """
     found = []
     for i in range(len(points) - 1):
         chord = Chord(points[i], points[i + 1], tolerance)
-        found += [Turn(which, i + place, point) for place, point in _turns(chord, which, _UNKNOWN)]
+        found += [TurningPoint(which, i + place, point) for place, point in _turns(chord, which, _UNKNOWN)]
         if i > 0:
             before, here, after = (float(point.tangent[which]) for point in points[i - 1 : i + 2])
             if abs(here) <= _FLAT < min(abs(before), abs(after)) and before * after < 0.0:
-                found.append(Turn(which, float(i), points[i]))
+                found.append(TurningPoint(which, float(i), points[i]))
     return sorted(found, key=lambda turn: turn.place)
 
 
-def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Point]]:
+def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, PathPoint]]:
     if chord.length < _CLOSEST:
         return
     flat = _FLAT * chord.length
@@ -241,27 +254,29 @@ def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Po
         yield at + (1.0 - at) * place, point
 
 
-def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[float, Point]:
+def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[float, PathPoint]:
     """Where the quantity ``which``, monotonic along the chord, takes the value ``target`` between its ends, to
     ``close`` of the larger distance of these from it."""
 
-    def off(point: Point) -> tuple[float, float | None]:
+    def off(point: PathPoint) -> tuple[float, float | None]:
         return float(point.m[which]) - target, float(chord.slope(point)[which])
 
     return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]), close)
 
 
-def find_zero(chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]) -> tuple[float, Point]:
+def find_zero(
+    chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]
+) -> tuple[float, PathPoint]:
     """Where ``function`` of the flow vanishes along the chord, given its values of opposite sign at the ends."""
     return _located(chord, lambda point: (function(point.solution), None), ends)
 
 
 def _located(
     chord: Chord,
-    function: Callable[[Point], tuple[float, float | None]],
+    function: Callable[[PathPoint], tuple[float, float | None]],
     ends: tuple[float, float],
     close: float = _CLOSE,
-) -> tuple[float, Point]:
+) -> tuple[float, PathPoint]:
     """The zero of a function (its value, and its derivative to sigma where it has one) along a chord.
 
     Newton's method where it stays in the bracket, else regula falsi with the Illinois rule.

@@ -15,7 +15,7 @@ from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 
 #: A flow this near to an edge, in the logarithm, is at the edge; rounding allowed beyond it.
 _NEAR, _ROUNDING = 0.3, 1e-9
-#: How far a search goes beyond a hold-up and a flux asked for, so that turns near them are seen from both sides.
+#: How far a search goes beyond a hold-up and a requested flux, so that turns near them are seen from both sides.
 _DEEPER, _FURTHER = 1.5, 3.0
 
 
@@ -42,11 +42,11 @@ class BranchEnd(StrEnum):
 
 
 @dataclass(frozen=True)
-class Range:
+class SearchRange:
     """Surface temperatures from ``coldest`` to ``hottest``, hold-ups from ``shallowest`` to ``deepest``.
 
-    A family may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
-    proportion to their temperature, and no family ends so. Mass fluxes above ``largest_flux`` are not asked for: a
+    A branch may end at an interface whose flow has vanished; on the half-line thin flows have a hold-up in
+    proportion to their temperature, and no branch ends so. Mass fluxes above ``largest_flux`` are not asked for: a
     branch may end on its way to them.
     """
 
@@ -57,7 +57,9 @@ class Range:
     largest_flux: float = np.inf
 
     @classmethod
-    def checked(cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free") -> Range:
+    def checked(
+        cls, surface_temperature: tuple[float, float], largest_holdup: float, surface: str = "free"
+    ) -> SearchRange:
         """The range given.
 
         Raises:
@@ -73,7 +75,7 @@ class Range:
             raise InputError(f"largest hold-up {largest_holdup:g}: must be from {SHALLOWEST:g} to {DEEPEST:g}")
         return cls(low, high, largest_holdup, SHALLOWEST if surface == "interface" else 0.0)
 
-    def reaching(self, axis: int, value: float) -> Range:
+    def reaching(self, axis: int, value: float) -> SearchRange:
         """The range widened, as far as allowed, to ``value`` of the surface temperature or hold-up."""
         if axis == LOG_M:
             return replace(self, deepest=min(max(self.deepest, value), DEEPEST))
@@ -83,7 +85,7 @@ class Range:
             hottest=min(max(self.hottest, value), WIDEST[1]),
         )
 
-    def restricted(self, which: int, value: float) -> Range:
+    def restricted(self, which: int, value: float) -> SearchRange:
         """The part of the range in which all flows lie at which the quantity ``which`` has a ``value``: no deeper than
         a given hold-up, and with trajectories no further than to a given flux, but for a margin."""
         if which == LOG_M:
@@ -91,7 +93,7 @@ class Range:
         return replace(self, largest_flux=_FURTHER * value) if which == LOG_Q else self
 
     def contains(self, macroscopic: Array, margin: float = _ROUNDING) -> bool:
-        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, give or take ``margin``."""
+        """Whether a flow (ln Q, ln h, ln M, ln T_surface) lies in the range, within ``margin``."""
         return bool(
             np.log(self.coldest) - margin <= macroscopic[LOG_T] <= np.log(self.hottest) + margin
             and macroscopic[LOG_M] <= np.log(self.deepest) + margin

@@ -29,7 +29,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Searched:
-    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` looked at, where they
+    """The range searched: surface temperatures (low, high) and largest hold-up; and the ``cells`` examined, where they
     were counted."""
 
     surface_temperature: tuple[float, float]
@@ -43,8 +43,8 @@ class FlowSet(Result, Sequence[Flow]):
 
     ``tolerance`` is the relative error that was allowed in Q, h and M; each flow has its own estimate.
     ``reason`` is one sentence on why there is none, or None where there are flows. ``incomplete`` is one where there
-    may be more: where a branch leaves the range searched towards what was asked for, a flow that was seen could not be
-    solved, or the search does not tell; None otherwise.
+    may be more: where a branch leaves the range searched towards what was requested, a flow that was seen could not be
+    solved, or the search leaves it open; None otherwise.
     """
 
     chute: Chute
@@ -170,7 +170,7 @@ class LineOfFlows:
 
 @dataclass(frozen=True, eq=False)
 class Branch(Result, LineOfFlows):
-    """One family of flows in order along its curve; ``ends`` says in words why it ends at either side."""
+    """One branch of flows in order along its curve; ``ends`` says in words why it ends at either side."""
 
     flows: tuple[Flow, ...]
     special: tuple[SpecialPoint, ...]
@@ -187,8 +187,8 @@ class Branch(Result, LineOfFlows):
 
 @dataclass(frozen=True, eq=False)
 class Curve(Result):
-    """All families of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
-    where there may be more: where a family was seen and not solved, or the search does not tell."""
+    """All branches of flows of one chute, in the range searched; ``reason`` where there is none, and ``incomplete``
+    where there may be more: where a branch was seen and not solved, or the search leaves it open."""
 
     chute: Chute
     branches: tuple[Branch, ...]
@@ -225,20 +225,20 @@ class Curve(Result):
         )
 
     def __repr__(self) -> str:
-        families = display.counted(len(self.branches), "family", "families")
+        branches = display.counted(len(self.branches), "branch", "branches")
         total = display.counted(sum(len(branch.flows) for branch in self.branches), "flow")
         reach = [
             display.span(NUMBERS[name].symbol, np.concatenate([getattr(branch, name) for branch in self.branches]))
             for name in ("mass_flux", "surface_temperature")
             if self.branches
         ]
-        return display.line("Curve", f"{families}, {total}", *reach, self.reason)
+        return display.line("Curve", f"{branches}, {total}", *reach, self.reason)
 
     def _repr_html_(self) -> str:
-        header = ["family", "", *(NUMBERS[name].symbol for name in PLACE)]
+        header = ["branch", "", *(NUMBERS[name].symbol for name in PLACE)]
         rows = [[str(i), *row] for i, branch in enumerate(self.branches, 1) for row in _stations(branch)]
-        families = display.counted(len(self.branches), "family", "families")
-        return display.html_table(f"{families} of flows on {self.chute}", header, rows, self.reason)
+        branches = display.counted(len(self.branches), "branch", "branches")
+        return display.html_table(f"{branches} of flows on {self.chute}", header, rows, self.reason)
 
 
 def _place(flow: Flow) -> list[str]:

@@ -25,7 +25,7 @@ def may_turn(slope: Array, noise: Array | float = 0.0) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True, eq=False)
-class Dip:
+class Extremum:
     """A step of a path between two values of one sign: the cubic with slopes by differences comes nearest to zero, or
     passes it furthest, at the ``share`` of the step, where it has the ``value``, with ``zeros`` to either side if it
     passes it."""
@@ -36,7 +36,7 @@ class Dip:
     zeros: tuple[float, ...]
 
 
-def dips(values: Array, at: Array, *, passing: bool = False) -> list[Dip]:
+def find_extrema(values: Array, at: Array, *, passing: bool = False) -> list[Extremum]:
     """The steps between the places ``at`` (k,) of a path in which ``values`` (k,) turn towards zero, and away again;
     ``passing`` zero alone, or all."""
     if len(values) < 3:
@@ -57,5 +57,5 @@ def dips(values: Array, at: Array, *, passing: bool = False) -> list[Dip]:
         share = min(turning[(turning > 0.0) & (turning < 1.0)], key=lambda x: np.polyval(cubic, x), default=0.5)
         lowest = float(np.polyval(cubic, share))
         inside = zeros.real[(zeros.imag == 0.0) & (zeros.real > 0.0) & (zeros.real < 1.0)] if lowest < 0.0 else ()
-        out.append(Dip(i, float(share), sign * lowest, tuple(sorted(map(float, inside)))))
+        out.append(Extremum(i, float(share), sign * lowest, tuple(sorted(map(float, inside)))))
     return out

@@ -38,7 +38,7 @@ class Interrupts:
 
     Attributes:
         seen: whether there was an interrupt, or the command is over and none matters any more.
-        told: whether the user has been told.
+        reported: whether the user has been informed.
     """
 
     current: Interrupts | None = None
@@ -47,7 +47,7 @@ class Interrupts:
         self._to_the_end = to_the_end
         self._installed = False
         self._over = Event()
-        self.seen = self.told = False
+        self.seen = self.reported = False
 
     def __enter__(self) -> Interrupts:
         # A shell that starts a command in the background has interrupts ignored; that remains.
@@ -91,13 +91,13 @@ class Interrupts:
         with far:
             while received := far.recv(64):
                 if signal.SIGINT in received and not self._over.wait(_GRACE):
-                    if not self.told:
+                    if not self.reported:
                         os.write(2, _LINE)
                     os._exit(INTERRUPTED)
 
     def _end(self) -> None:
         """End with the exit code of an interrupt: Python has another one if the exception passed ``exec``."""
-        if self.told:
+        if self.reported:
             with suppress(OSError, ValueError):
                 sys.stdout.flush()
                 sys.stderr.flush()
@@ -121,14 +121,14 @@ def nothing_but_interrupts() -> Iterator[None]:
         raise KeyboardInterrupt from None
 
 
-def told() -> None:
+def mark_reported() -> None:
     """Say that the user knows of the interrupt."""
     if Interrupts.current is not None:
-        Interrupts.current.told = True
+        Interrupts.current.reported = True
 
 
-def tell() -> int:
-    """Tell the user of an interrupt that no command told, and return the exit code."""
-    told()
+def report() -> int:
+    """Report an interrupt that no command reported, and return the exit code."""
+    mark_reported()
     os.write(2, _LINE)
     return INTERRUPTED

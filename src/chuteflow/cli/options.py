@@ -44,7 +44,7 @@ _STEEPEST, _FLATTEST = 3.0, 1.0
 
 
 @dataclass(frozen=True)
-class Amounts:
+class NumbersWithUnit:
     """Numbers with a ``unit`` after them, as they were typed."""
 
     texts: tuple[str, ...]
@@ -68,7 +68,7 @@ class Number(click.ParamType):
             self.fail(f"{value!r} is not a number", param, ctx)
 
 
-class Interval(click.ParamType):
+class IntervalType(click.ParamType):
     """Two numbers as LO:HI; with a unit after them where ``units`` are taken, then as typed."""
 
     name = "lo:hi"
@@ -78,14 +78,34 @@ class Interval(click.ParamType):
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float] | Amounts:
+    ) -> tuple[float, float] | NumbersWithUnit:
         """Both ends."""
         ends, unit = without_unit(value) if self._units else (value, "")
         try:
             low, high = map(float, ends.split(":"))
         except ValueError:
             self.fail(f"{value!r} is not a range: write two numbers as LO:HI, for example 0.01:500", param, ctx)
-        return Amounts(tuple(ends.split(":")), unit) if unit else (low, high)
+        return NumbersWithUnit(tuple(ends.split(":")), unit) if unit else (low, high)
+
+
+class Size(click.ParamType):
+    """Two whole numbers with an x between, written as ``pattern``, for ``example`` 400x400."""
+
+    def __init__(self, pattern: str, example: str) -> None:
+        self.name = pattern.lower()
+        self._pattern, self._example = pattern, example
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Both numbers."""
+        try:
+            first, second = map(int, str(value).lower().split("x"))
+        except ValueError:
+            self.fail(
+                f"{value!r} is not a size: write two whole numbers as {self._pattern}, for example {self._example}",
+                param,
+                ctx,
+            )
+        return first, second
 
 
 class NumberInUnits(click.ParamType):
@@ -93,11 +113,11 @@ class NumberInUnits(click.ParamType):
 
     name = "number"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | Amounts:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | NumbersWithUnit:
         """The number."""
         text, unit = without_unit(str(value))
         number = Number().convert(text if unit else value, param, ctx)
-        return Amounts((text,), unit) if unit else number
+        return NumbersWithUnit((text,), unit) if unit else number
 
 
 def without_unit(text: str) -> tuple[str, str]:
@@ -113,7 +133,7 @@ class NumberOrInterval(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The number, or both ends."""
-        kind = Interval() if ":" in str(value) else Number()
+        kind = IntervalType() if ":" in str(value) else Number()
         return kind.convert(value, param, ctx)
 
 
@@ -291,7 +311,7 @@ condition_options = _options(
 search_range_options = _options(
     option(
         "--search-temperature",
-        type=Interval(units=True),
+        type=IntervalType(units=True),
         help=f"Surface temperatures searched; {SURFACE_TEMPERATURE[0]:g}:{SURFACE_TEMPERATURE[1]:.0f} by default.",
     ),
     option(
@@ -324,7 +344,9 @@ def plot_options(what: str) -> Callable[[Command], Command]:
             metavar="FILE",
             help=f"Draw {what}{' ' if what else ''}into FILE: .png, .pdf or .svg, or several as in flows.png,pdf.",
         ),
-        option("--theme", metavar="NAME", help="Look of the picture: print (the default) or slides, with larger text."),
+        option(
+            "--theme", metavar="NAME", help="Style of the picture: print (the default) or slides, with larger text."
+        ),
     )
 
 
@@ -440,7 +462,7 @@ def closure_names(given: Sequence[str]) -> list[str]:
 
 
 def scales(given: Mapping[str, Any]) -> Scales | None:
-    """The scales of the options, or None where dimensionless results are asked for: those of the chute's file or case
+    """The scales of the options, or None where dimensionless results are requested: those of the chute's file or case
     with --si, or where one of them is given.
 
     Raises:
@@ -454,7 +476,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
     known = given["grains"]
     for name in ("diameter", "density"):
         if name not in texts and name not in known:
-            also = "; a --chute file or a --case of `chuteflow cases` may say them too" if given["si"] else ""
+            also = "; a --chute file or a --case of `chuteflow cases` may give them too" if given["si"] else ""
             raise InputError(f"SI units need --diameter and --density: --{name} is missing{also}")
     from chuteflow.io.units import read_si
     from chuteflow.steady.quantities import Scales
@@ -508,12 +530,10 @@ def own(given: Mapping[str, Any], name: str, quantity: str, slope: float | None,
         InputError: for a unit without grains, of another kind, or where there is not one slope.
     """
     typed = given[name]
-    if not isinstance(typed, Amounts):
+    if not isinstance(typed, NumbersWithUnit):
         return typed
     if slope is None:
-        raise InputError(
-            f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: leave the unit away"
-        )
+        raise InputError(f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: omit the unit")
     from chuteflow.io.units import read_amount
 
     values = [read_amount(_written(name), f"{one} {typed.unit}", quantity, scales, slope) for one in typed.texts]
@@ -567,7 +587,7 @@ def search(given: Mapping[str, Any], slope: float | None, scales: Scales | None 
 def nearest(
     given: Mapping[str, Any], chute: Chute, condition: Mapping[str, float], scales: Scales | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """The nearest that has a flow in the range asked for where ``chute`` has none: what JSON has of it, and lines."""
+    """The nearest that has a flow in the requested range where ``chute`` has none: what JSON has of it, and lines."""
     from chuteflow.branches.nearest import nearest as look
     from chuteflow.io import contract, words
 

@@ -74,7 +74,7 @@ def chuteflow() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, by default on the arguments of the process, and return its exit code."""
     if "multiprocessing.spawn" in sys.modules:
-        # This may be a worker that runs the script of its parent once more.
+        # This may be a worker that runs the script of its parent again.
         from chuteflow.processes import require_main_guard
 
         require_main_guard()
@@ -99,7 +99,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except ChuteflowError as error:
         return _complain(str(error), FAILED)
     except (click.Abort, KeyboardInterrupt, interrupts.Interrupted) as error:
-        interrupts.told()
+        interrupts.mark_reported()
         Progress().clear()  # of a command that was interrupted
         return _complain(str(error) or "interrupted", interrupts.INTERRUPTED)
     except SystemExit:
@@ -130,7 +130,7 @@ def _prepare_streams() -> None:
 
 
 def _abandon(stream: TextIO) -> None:
-    """Let what is left in the buffer of ``stream`` go to nowhere, so that it does not fail once more at exit."""
+    """Let what is left in the buffer of ``stream`` go to nowhere, so that it does not fail again at exit."""
     with suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

@@ -14,7 +14,7 @@ _CLEAR = "\r\x1b[K"
 
 
 class Progress:
-    """A line that tells how far a command is, inside a ``with`` block, at whose end it is taken away.
+    """A line that shows how far a command is, inside a ``with`` block, at whose end it is taken away.
 
     It is written over at most once in ``seconds``.
     """
@@ -31,7 +31,7 @@ class Progress:
     ) -> None:
         self.clear()
 
-    def tell(self, text: str) -> None:
+    def show(self, text: str) -> None:
         """Show ``text`` in place of what stands there."""
         if self.is_shown and time.monotonic() >= self._next:
             self._next = time.monotonic() + self._seconds

@@ -236,9 +236,9 @@ def _contacts(
         share = np.where(is_base, law.tangential_share(law.wall_restitution), law.tangential_share(law.restitution))
         # The limit is mu times the elastic and damped parts, as in LAMMPS.
         limit = law.friction * np.abs(press)
-        grip = np.minimum(share * damping * speed, limit)
-        force = force - np.where(speed > 0.0, grip / np.maximum(speed, 1e-300), 0.0)[:, None] * slide
-        loss = loss + grip * speed
+        wall_shear = np.minimum(share * damping * speed, limit)
+        force = force - np.where(speed > 0.0, wall_shear / np.maximum(speed, 1e-300), 0.0)[:, None] * slide
+        loss = loss + wall_shear * speed
     height = frame.position[upper, 2]
     return Contact(
         force=force,

@@ -280,7 +280,7 @@ def _base_differences(measured: Measured, chosen: Law, mappings: Sequence[str]) 
     reduced = reduce(chosen, np.array([nu / (1.0 - nu / chosen.densest)]), measured.restitution, measured.slope)
     for mapping in mappings:
         r = _roughness(measured, mapping)
-        slip = float(boundary.slip_coefficient(reduced.shear, reduced.grip, r, measured.slope)[0])
+        slip = float(boundary.slip_coefficient(reduced.shear, reduced.wall_shear, r, measured.slope)[0])
         own, error = have["slip_ratio"], measured.number_errors.get("slip_ratio", math.nan)
         yield difference(f"slip, r by {mapping}", own, slip, error)
         if "heat_from_base" in have and math.isfinite(measured.wall_restitution):

@@ -36,7 +36,7 @@ _COMPARED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class StudyResult:
     """A measured flow by its name, and the theory beside it at the same hold-up."""
 
     name: str
@@ -70,7 +70,7 @@ class Result:
         ]
 
 
-def read_folder(folder: str | os.PathLike[str], closures: Sequence[str] = CLOSURES) -> Iterator[Result]:
+def read_folder(folder: str | os.PathLike[str], closures: Sequence[str] = CLOSURES) -> Iterator[StudyResult]:
     """The measured flows in the files of a folder, by name, each compared with the theory.
 
     Raises:
@@ -81,7 +81,7 @@ def read_folder(folder: str | os.PathLike[str], closures: Sequence[str] = CLOSUR
     if not files:
         raise InputError(f"{folder} holds no measured flows, .nc or .csv")
     for file in files:
-        yield Result(file.stem, compare(records.load(file), closures, conditions=("M",)))
+        yield StudyResult(file.stem, compare(records.load(file), closures, conditions=("M",)))
 
 
 def thinned(measured: Measured, heights: int = HEIGHTS) -> Measured:
@@ -104,7 +104,7 @@ def rest_slope(roughness: float) -> float:
     return roughness / math.sqrt(3.0) / math.sqrt(room) if room > 0.0 else math.inf
 
 
-def table(results: Sequence[Result], closures: Sequence[str] = CLOSURES) -> list[list[str]]:
+def table(results: Sequence[StudyResult], closures: Sequence[str] = CLOSURES) -> list[list[str]]:
     """Rows of cells with a heading: the run, its flow, and the theory beside it."""
     header = ["run", "e", "slope", "M", "r", "state", "drift of Q", "Q", "T_mean", "nu"]
     header += [f"Q {closure[:3]}/{mapping}" for closure in closures for mapping in ("area", "spacing")]
@@ -112,7 +112,7 @@ def table(results: Sequence[Result], closures: Sequence[str] = CLOSURES) -> list
     return [header, *(_row(one, closures) for one in results)]
 
 
-def _row(one: Result, closures: Sequence[str]) -> list[str]:
+def _row(one: StudyResult, closures: Sequence[str]) -> list[str]:
     measured = one.measured
     numbers, errors = measured.numbers, measured.number_errors
     drift = measured.drifts.get("mass_flux")

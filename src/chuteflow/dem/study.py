@@ -50,7 +50,7 @@ _WAVE_SCHEDULE = Schedule(settle=100.0, measure=300.0)
 
 
 @dataclass(frozen=True)
-class Case:
+class StudyCase:
     """One run of the study: its name, which is that of its folder, its scene and its schedule."""
 
     name: str
@@ -58,7 +58,7 @@ class Case:
     schedule: Schedule = _SCHEDULE
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[StudyCase]:
     """All runs, in the order in which they are done: every chute once before seeds are changed, and first the seeds of
     flows that keep their state."""
     done = set()
@@ -68,7 +68,7 @@ def cases() -> Iterator[Case]:
             yield case
 
 
-def _ordered() -> Iterator[Case]:
+def _ordered() -> Iterator[StudyCase]:
     yield from _waves()
     yield from _paper()
     yield from (_hot(0, seed) for seed in SEEDS)
@@ -84,22 +84,22 @@ def _of(base: str) -> Sequence[int]:
     return RANDOM if base == "random" else range(len(HOT))
 
 
-def _hot(number: int, seed: int, base: str = "triangular") -> Case:
+def _hot(number: int, seed: int, base: str = "triangular") -> StudyCase:
     e, slope, holdup, roughness = HOT[number]
     box = _BOX if holdup < 2.0 else _SMALLER_BOX
     scene = Scene(Chute(slope, e, e, roughness), holdup, box=box, base=base, seed=seed, bounds=_BOUNDS)
     schedule = _LONG if number in LASTING else _SCHEDULE
-    return Case(f"hot{number + 1:02d}-{base}-{seed}", scene, schedule)
+    return StudyCase(f"hot{number + 1:02d}-{base}-{seed}", scene, schedule)
 
 
-def _paper() -> Iterator[Case]:
+def _paper() -> Iterator[StudyCase]:
     for start in ("hot", "cold"):
         for name, holdup in PAPER_HOLDUPS.items():
             scene = Scene(PAPER, holdup, box=_BOX, start=start, bounds=Bounds(restitution=6e-3))
-            yield Case(f"paper-{name}-{start}", scene)
+            yield StudyCase(f"paper-{name}-{start}", scene)
 
 
-def _variations() -> Iterator[Case]:
+def _variations() -> Iterator[StudyCase]:
     """The first chute with contacts twice as stiff, half the time step, and a box of twice the length."""
     first = _hot(0, 1)
     scene = like_theory(first.scene)
@@ -109,17 +109,17 @@ def _variations() -> Iterator[Case]:
         ("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1]))),
         ("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness)),
     ):
-        yield Case(name, varied, first.schedule)
+        yield StudyCase(name, varied, first.schedule)
 
 
-def _waves() -> Iterator[Case]:
+def _waves() -> Iterator[StudyCase]:
     """Flows with a wave that grows by the theory, in boxes for one wave across the slope."""
     for number, box in WAVY.items():
         scene = replace(_hot(number, 1).scene, box=box, bounds=Bounds(restitution=1e-2))
-        yield Case(f"wide-{number + 1}", scene, _WAVE_SCHEDULE)
+        yield StudyCase(f"wide-{number + 1}", scene, _WAVE_SCHEDULE)
 
 
-def prepared(case: Case, folder: str | os.PathLike[str]) -> Run:
+def prepared(case: StudyCase, folder: str | os.PathLike[str]) -> Run:
     """The run of a case in its folder below ``folder``; a hot start begins near the flow of the theory."""
     path = Path(folder) / case.name
     if (path / RECORD).exists():

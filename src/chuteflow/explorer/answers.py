@@ -6,6 +6,7 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,16 @@ import numpy as np
 
 from chuteflow.branches.curve import curve
 from chuteflow.branches.enumeration import flows
-from chuteflow.branches.results import KINDS, Branch
+from chuteflow.branches.results import Curve
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
+from chuteflow.explorer.contents import curve_content, limits_passed, short
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
+from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
+from chuteflow.explorer.straight import straight_heights
 from chuteflow.io import contract
-from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
@@ -28,17 +32,7 @@ _VISIBLE = 1e-6
 _CURVE_POINTS = 90
 #: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
 #: they are halved until a straight line across each is off by this share of a field's largest value at most.
-_INTERVALS, _STRAIGHT, _HALVINGS = 16, 1e-3, 8
-#: A flow itself is so many times as high as its centre of mass; so are all profiles, by the highest of the flows.
-_TOP = 2.5
-_FIELDS = {
-    "nu": "volume_fraction",
-    "T": "granular_temperature",
-    "u": "velocity",
-    "production": "production",
-    "dissipation": "dissipation",
-}
-_DIGITS = 7
+_INTERVALS, _STRAIGHT = 16, 1e-3
 #: What else a computation may end with, which is no reason to end the process.
 _FAILURES = (ArithmeticError, ValueError, LookupError)
 
@@ -74,6 +68,7 @@ def problem(status: int, what: str) -> Answer:
 _LEFT_OUT = {
     "flows": "the flows at this flux are left out",
     "curve": "the curve of all flows is left out",
+    "limits": "where the curve passes limits of the theory is left out",
     "map": "this column of the map is left out",
     "export": "this file is left out",
     "stability": "the stability of this flow is left out",
@@ -98,12 +93,12 @@ def _flows(query: Query) -> Answer:
     chute, other = queries.read(query, other=("Q",), optional=GRAINS)
     flux, scales = queries.flux(other["Q"]), queries.scales(other)
     found = flows(chute, Q=flux, tolerance=_VISIBLE)
-    top = _TOP * max((flow.centre_of_mass for flow in found), default=1.0)
+    top = TOP * max((flow.centre_of_mass for flow in found), default=1.0)
     shown = [
         {
             **_place(flow),
             "profile": _profile(flow, top),
-            "budget": asdict(flow.energy_budget) | {"heat_from_base": flow.energy_budget.heat_from_base},
+            "budget": budget(flow),
             **sentences.of_flow(flow, found),
         }
         for flow in found
@@ -121,58 +116,35 @@ def _flows(query: Query) -> Answer:
 
 def _place(flow: Flow) -> dict[str, Any]:
     """Where a flow is on the curve, how well that is known, and how far the flow keeps to the theory."""
-    told = contract.flow_object(flow)
-    names = (*(NUMBERS[name].symbol for name in contract.PLACE), "error", "validity")
-    return {name: told[name] for name in names}
+    numbers = {NUMBERS[name].symbol: contract.finite(getattr(flow, name)) for name in contract.PLACE}
+    return numbers | {"error": contract.finite(flow.error), "validity": contract.validity_object(flow)}
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
     """Fields over height, at so many heights that straight lines between them show no corner that is not there."""
     highest = min(top, flow.interface_height)
-    own = min(_TOP * flow.centre_of_mass, highest)
-    heights = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
-    fields = _fields(flow, heights)
-    bends = np.ones(len(heights) - 1, dtype=bool)
-    for _ in range(_HALVINGS):
-        middles = 0.5 * (heights[1:] + heights[:-1])[bends]
-        exact = _fields(flow, middles)
-        straight = 0.5 * (fields[:, 1:] + fields[:, :-1])[:, bends]
-        off = (np.abs(exact - straight) > _STRAIGHT * np.abs(fields).max(axis=1, keepdims=True)).any(axis=0)
-        places = np.flatnonzero(bends) + 1
-        heights, fields = np.insert(heights, places, middles), np.insert(fields, places, exact, axis=1)
-        # Both halves of an interval that bends are looked at again, the others are done.
-        halves = np.where(bends, 2, 1)
-        bends[bends] = off
-        bends = np.repeat(bends, halves)
-        if not off.any():
-            break
-    return {"z": _short(heights)} | {name: _short(field) for name, field in zip(_FIELDS, fields, strict=True)}
-
-
-def _fields(flow: Flow, heights: Array) -> Array:
-    """The fields (fields, heights) that the page shows."""
-    profile = flow.profile(heights)
-    return np.array([getattr(profile, name) for name in _FIELDS.values()])
-
-
-def _short(values: np.ndarray) -> list[float]:
-    return [float(f"{value:.{_DIGITS}g}") for value in values]
+    own = min(TOP * flow.centre_of_mass, highest)
+    first = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
+    heights, (found,) = straight_heights([partial(fields, flow)], first, _STRAIGHT)
+    return {"z": short(heights)} | {name: short(field) for name, field in zip(FIELDS, found, strict=True)}
 
 
 def _curve(query: Query) -> Answer:
     chute, other = queries.read(query, optional=GRAINS)
     scales = queries.scales(other)
-    found = curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
-    content = contract.curve_object(found)
-    for branch, entry in zip(found.branches, content["branches"], strict=True):
-        entry |= _rounded(branch) | {"density": [flow.density for flow in branch.flows]}
-        # The page shows where the limits are passed, without the numbers behind it.
-        entry["validity"] = {"words": entry["validity"]["words"]}
-    return _json(content | {"says": sentences.of_curve(found, scales), "kinds": KINDS})
+    found = _drawn(chute)
+    return _json(curve_content(found, scales))
 
 
-def _rounded(branch: Branch) -> dict[str, list[float]]:
-    return {NUMBERS[name].symbol: _short(getattr(branch, name)) for name in contract.PLACE}
+def _limits(query: Query) -> Answer:
+    chute, _ = queries.read(query)
+    return _json({"words": [limits_passed(branch) for branch in _drawn(chute).branches]})
+
+
+@lru_cache(maxsize=4)
+def _drawn(chute: Chute) -> Curve:
+    """The curve as the page draws it; its flows are told by their numbers."""
+    return curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
 
 
 def _map(query: Query) -> Answer:
@@ -184,13 +156,17 @@ def _map(query: Query) -> Answer:
 def _stability(query: Query) -> Answer:
     from chuteflow.explorer.growth import verdict
 
-    chute, other = queries.read(query, other=("Q", "flow"), optional=GRAINS)
+    at_flux = "branch" not in query
+    chute, other = queries.read(query, other=("Q", "flow") if at_flux else ("branch", "point"), optional=GRAINS)
     scales = queries.scales(other)
-    found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
-    number = other["flow"]
-    if number not in map(str, range(len(found))):
-        raise InputError(f"flow = {number[:40]!r}: there are {len(found)} flows, counted from 0")
-    known = verdict(found[int(number)])
+    if at_flux:
+        found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
+        flow = found[queries.place("flow", other, len(found))]
+    else:
+        branches = _drawn(chute).branches
+        branch = branches[queries.place("branch", other, len(branches))]
+        flow = branch.flows[queries.place("point", other, len(branch.flows))]
+    known = verdict(flow)
     says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
     return _json(asdict(known) | {"says": says, "waves": waves})
 
@@ -205,6 +181,11 @@ def _export(query: Query) -> Answer:
         "profiles": lambda: flows(chute, Q=queries.flux(other["Q"])),
         "curve": lambda: curve(chute),
     }
+    if (other["what"], other["format"]) == ("page", "html"):
+        from chuteflow.explorer.standalone import standalone
+
+        page = standalone(chute, queries.flux(other["Q"]), scales)
+        return Answer(200, "text/html", page.encode(), "chuteflow.html")
     media = {"csv": "text/csv", "svg": "image/svg+xml", "png": "image/png"}
     for name, table in (("what", kinds), ("format", media)):
         if other[name] not in table:
@@ -225,6 +206,7 @@ def _export(query: Query) -> Answer:
 QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "flows": _flows,
     "curve": _curve,
+    "limits": _limits,
     "map": _map,
     "stability": _stability,
     "export": _export,

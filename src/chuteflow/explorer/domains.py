@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from chuteflow.explorer.queries import CONTROLS, ColumnAsked
-from chuteflow.maps.columns import Part, column
-from chuteflow.maps.plane import HOT_CODES, SUMMARY, Axis, Plane, hot_code, summary
+from chuteflow.maps.columns import PiecewiseConstant, classify_column
+from chuteflow.maps.plane import HOT_CODES, SUMMARY, ParameterAxis, ParameterPlane, classify_hot, summarise
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 
 #: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
 #: where every point has trajectories of its own, finer for what is known in closed form.
 _FIRST, _FIRST_HOT = 9, 33
+#: The same of a coarse column, which takes hot flows from the same search.
+_FIRST_COARSE, _TOLERANCE_COARSE = 5, 0.06
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 
 
@@ -29,7 +31,7 @@ class MapColumn:
     outer: str
     inner: str
     at: float
-    parts: dict[str, Part]
+    parts: dict[str, PiecewiseConstant]
     tolerance: float
 
 
@@ -42,32 +44,35 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     x, y, place = asked.x, asked.y, asked.place
     plane = _plane(asked.chute, x, y)
     inner, outer = (x, y) if plane.transposed else (y, x)
-    tolerance = _TOLERANCE[BY_KEY[inner].of_base]
-    found = column(place, partial(summary, plane), [*_evenly(_FIRST), *_beside(plane, asked, tolerance)], tolerance)
+    tolerance = _TOLERANCE_COARSE if asked.coarse else _TOLERANCE[BY_KEY[inner].of_base]
+    first = _FIRST_COARSE if asked.coarse else _FIRST
+    found = classify_column(
+        place, partial(summarise, plane), [*_evenly(first), *_beside(plane, asked, tolerance)], tolerance
+    )
     # Narrower bands are where the search happened to meet them.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
-    if plane.chute.surface == "free":
-        hot = column(place, partial(hot_code, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
+    if plane.chute.surface == "free" and not asked.coarse:
+        hot = classify_column(place, partial(classify_hot, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
         parts["hot"] = hot.parts[HOT_CODES.index("hot")]
     return MapColumn(
         outer,
         inner,
         float(plane.outer.at(place)),
-        {name: Part(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
+        {name: PiecewiseConstant(tuple(map(plane.inner.at, part.stops)), part.values) for name, part in parts.items()},
         0.5 * tolerance * (plane.inner.high - plane.inner.low),
     )
 
 
-def _beside(plane: Plane, asked: ColumnAsked, tolerance: float) -> list[float]:
+def _beside(plane: ParameterPlane, asked: ColumnAsked, tolerance: float) -> list[float]:
     """Shares of the inner axis a little to either side of what is near, closer together than what is halved."""
     shares = [(value - plane.inner.low) / (plane.inner.high - plane.inner.low) for value in asked.near]
     return [share + side * tolerance for share in shares for side in (-0.49, 0.49)]
 
 
 @lru_cache(maxsize=8)
-def _plane(chute: Chute, x: str, y: str) -> Plane:
-    across, up = (Axis(BY_KEY[name].name, CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
-    return Plane(across, up, chute, ())
+def _plane(chute: Chute, x: str, y: str) -> ParameterPlane:
+    across, up = (ParameterAxis(BY_KEY[name].name, CONTROLS[name].low, CONTROLS[name].high) for name in (x, y))
+    return ParameterPlane(across, up, chute, ())
 
 
 def _evenly(count: int) -> list[float]:

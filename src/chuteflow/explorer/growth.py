@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from chuteflow.errors import InputError, SolveError
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 from chuteflow.steady.flow import Flow
 
 

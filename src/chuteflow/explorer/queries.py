@@ -10,6 +10,7 @@ from chuteflow.checks import number_in
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
+from chuteflow.steady.cases import CASES, GUESSED, Case
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.quantities import Scales
 from chuteflow.theory.laws import LAWS, runs_code
@@ -82,10 +83,11 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Preset:
-    """A case worth looking at."""
+    """A case worth looking at: what it sets of the page's state, and ``words`` on how its numbers are known."""
 
     title: str
     state: Mapping[str, float | str]
+    words: str = ""
 
 
 _BASE = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun", "Q": 3.0}
@@ -102,6 +104,26 @@ PRESETS = (
     Preset("Heat by Fourier's law alone (figures 15 to 17)", _BASE | {"closure": "lun-fourier"}),
     Preset("Too steep for hot flows (figure 14)", _BASE | {"slope": 0.45}),
 )
+
+
+def cases() -> list[Preset]:
+    """The chutes and materials of ``chuteflow cases``, with their grains."""
+    return [Preset(one.name, _state(one), _known(one)) for one in CASES.values()]
+
+
+def _state(one: Case) -> dict[str, float | str]:
+    """What a case says, by the names of the page's state; its grains have a diameter in mm."""
+    said: dict[str, float | str] = {key: known.value for key, known in one.numbers.items()} | dict(one.names)
+    grains = one.scales
+    return said if grains is None else said | {"d": round(1e3 * grains.diameter, 12), "rho": grains.density}
+
+
+def _known(one: Case) -> str:
+    numbers = {**one.numbers, **one.grains}
+    guessed = [key for key, known in numbers.items() if known.how == GUESSED]
+    told = f" Guessed: {', '.join(guessed)}; put your own in their place." if guessed else ""
+    return f"{one.name}: {one.description}.{told}"
+
 
 _DEFAULTS = {"surface": SURFACES[0], "closure": next(iter(LAWS))}
 
@@ -139,6 +161,17 @@ def flux(text: str) -> float:
     return number_in("Q", text, *FLUX_RANGE)
 
 
+def place(name: str, given: Query, count: int) -> int:
+    """The place of a query among so many, counted from 0.
+
+    Raises:
+        InputError: for one that there is not.
+    """
+    if given[name] not in map(str, range(count)):
+        raise InputError(f"{name} = {given[name][:40]!r}: there are {count}, counted from 0")
+    return int(given[name])
+
+
 def scales(given: Query) -> Scales | None:
     """The scales of the grains of a query, or None where it names none.
 
@@ -160,7 +193,8 @@ class ColumnAsked:
     """A column of the map: the chute, the two parameters across and up, the place (share of the outer axis), and
     values of the inner parameter (``near``) at which the classes of the columns beside it change.
 
-    The chute has the axes' own parameters at the low ends of their ranges.
+    A ``coarse`` column is one to look at while sliders move. The chute has the axes' own parameters at the low ends of
+    their ranges.
     """
 
     chute: Chute
@@ -168,6 +202,7 @@ class ColumnAsked:
     y: str
     place: float
     near: tuple[float, ...]
+    coarse: bool = False
 
 
 #: Values near which the classes of a column are looked at closely, at most.
@@ -189,9 +224,11 @@ def map_column(query: Query) -> ColumnAsked:
     if x == y:
         raise InputError(f"x and y are both {x}: give two parameters")
     held = dict(query) | {name: str(CONTROLS[name].low) for name in (x, y)}
-    chute, other = read(held, other=("x", "y", "place"), optional=("near",))
+    chute, other = read(held, other=("x", "y", "place"), optional=("near", "coarse"))
     near = [text for text in other.get("near", "").split(",") if text]
     if len(near) > MOST_NEAR:
         raise InputError(f"near has {len(near)} values: give at most {MOST_NEAR}")
     values = tuple(number_in("near", text, -1.0, 2.0) for text in near)
-    return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values)
+    if other.get("coarse", "1") != "1":
+        raise InputError(f"coarse = {other['coarse'][:40]!r}: must be 1, or left away")
+    return ColumnAsked(chute, x, y, number_in("place", other["place"], 0.0, 1.0), values, "coarse" in other)

@@ -7,8 +7,11 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.quantities import Scales
 
 
-def recipes(chute: Chute, flux: float, scales: Scales | None) -> dict[str, str]:
-    """``command`` and ``python``: each writes the tables of profiles and of the curve that the page exports."""
+def recipes(chute: Chute, flux: float | str, scales: Scales | None) -> dict[str, str]:
+    """``command`` and ``python``: each writes the tables of profiles and of the curve that the page exports.
+
+    The flux may be a text that stands for one.
+    """
     given = contract.chute_object(chute)
     options = " ".join(
         f"--{short} {value if isinstance(value, str) else repr(value)}" for short, value in given.items()

@@ -58,6 +58,7 @@ def lanes() -> dict[str, Lane]:
 STAGES: Mapping[str, tuple[Stage, ...]] = {
     "flows": (Stage("quick", Limits(0.3, 1.5)), Stage("slow", Limits(1.6, 16.0))),
     "curve": (Stage("quick", Limits(0.3, 1.5)), Stage("slow", Limits(1.6, 16.0))),
+    "limits": (Stage("slow", Limits(2.0, 20.0)),),
     "map": (Stage("drawing", Limits(2.0, 20.0)),),
     "export": (Stage("drawing", Limits(20.0, 100.0)),),
     "stability": (Stage("stability", Limits(20.0, 100.0)),),

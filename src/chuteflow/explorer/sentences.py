@@ -27,7 +27,12 @@ _WAVES = {
 
 def of_flow(flow: Flow, among: FlowSet) -> dict[str, str]:
     """The name of a flow among others, and its kinds."""
-    return {"name": words.among(flow, among), "kinds": f"density {flow.density}, interior {flow.interior}"}
+    return {"name": words.among(flow, among), "kinds": kinds(flow)}
+
+
+def kinds(flow: Flow) -> str:
+    """The kinds of a flow."""
+    return f"density {flow.density}, interior {flow.interior}"
 
 
 def of_flows(found: FlowSet, flux: float, scales: Scales | None) -> str:

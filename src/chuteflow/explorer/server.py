@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +16,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from chuteflow import __version__
 from chuteflow.errors import InputError
-from chuteflow.explorer import queries
+from chuteflow.explorer.about import about
 from chuteflow.explorer.answers import QUESTIONS, Answer, answer
 from chuteflow.explorer.scheduler import Scheduler
 from chuteflow.explorer.worker import Compute
-from chuteflow.steady.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -85,8 +82,13 @@ def host_of(header: str) -> str:
     return (name if colon and port.isdigit() else header).strip("[]").lower()
 
 
-def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer) -> Starlette:
-    """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``."""
+def application(
+    hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer, data: Sequence[Mapping[str, Any]] = ()
+) -> Starlette:
+    """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``.
+
+    The page draws ``data``, what was measured, behind the flows.
+    """
     scheduler = Scheduler(compute)
 
     @asynccontextmanager
@@ -107,10 +109,13 @@ def application(hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answe
 
         return respond
 
+    async def told(_: Request) -> Response:
+        return JSONResponse(about(data))
+
     served = Starlette(
         routes=[
             Route("/", _page),
-            Route("/about", _about),
+            Route("/about", told),
             *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
@@ -151,25 +156,6 @@ def bound(host: str, port: int | None) -> socket.socket:
 
 async def _page(_: Request) -> Response:
     return FileResponse(PAGE / "index.html")
-
-
-async def _about(_: Request) -> Response:
-    return JSONResponse(
-        {
-            "version": __version__,
-            "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
-            "presets": [{"title": preset.title, "state": dict(preset.state)} for preset in queries.PRESETS],
-            "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
-            "quantities": {
-                quantity.symbol: {
-                    "description": quantity.description,
-                    "unit": quantity.unit,
-                    "dimension": quantity.dimension,
-                }
-                for quantity in QUANTITIES.values()
-            },
-        }
-    )
 
 
 def _response(given: Answer, told: bool) -> Response:

@@ -19,8 +19,8 @@ from chuteflow.fitting.identifiability import trade_offs
 from chuteflow.fitting.intervals import BetterFit, Interval, interval
 from chuteflow.fitting.measurements import Measurements, Series
 from chuteflow.fitting.objective import LOSSES, Minimum, Objective
-from chuteflow.fitting.residuals import Case, Place
-from chuteflow.fitting.starts import MANY_TRIALS, Candidate, at, candidates
+from chuteflow.fitting.residuals import TrialChute, TrialFlow
+from chuteflow.fitting.starts import MANY_TRIALS, StartingPoint, at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
@@ -37,7 +37,7 @@ _ROUGHLY, _CLOSELY = 1e-3, 1e-8
 _LENIENT, _TIGHT, _FLAT = 0.01, 0.002, 0.15
 #: First fits that are this many times worse than the best are given up.
 _HOPELESS = 30.0
-#: Confidence of intervals unless another is asked for.
+#: Confidence of intervals by default.
 CONFIDENCE = 0.95
 #: Trial chutes at most.
 _MOST_TRIALS = 100_000
@@ -57,7 +57,7 @@ _NEAR = 0.05
 class Estimate:
     """One parameter: its value, standard error and confidence interval.
 
-    ``determined`` tells whether the data end the interval on both sides.
+    ``determined`` is whether the data end the interval on both sides.
     """
 
     key: str
@@ -79,8 +79,8 @@ class Estimate:
         if self.interval.open:
             return f"the data do not determine {self.key}: all values from {low} to {high} fit"
         if self.interval.ends[0] == "crossed":
-            return f"{self.key} is above {low}: the data do not say by how much"
-        return f"{self.key} is below {high}: the data do not say by how much"
+            return f"{self.key} is above {low}: the data do not determine by how much"
+        return f"{self.key} is below {high}: the data do not determine by how much"
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +276,7 @@ def fit(
         base_height: whether the height of the base is unknown, in each experiment.
         loss: "linear" for least squares, or one that outliers count for less in: soft_l1, huber, cauchy.
         confidence: of the intervals.
-        ranges: between which values parameters are looked for first, by name.
+        ranges: between which values parameters are searched for first, by name.
         trials: how many trial chutes the search starts from.
 
     Raises:
@@ -290,7 +290,7 @@ def fit(
     parameters = chosen_parameters(chute, free, ranges or {})
     if measured.in_units and any(parameter.key == "slope" for parameter in parameters):
         raise InputError("the slope is free, and makes the measurements dimensionless: give them without units")
-    cases = tuple(Case.of(experiment, chute, parameters) for experiment in measured.experiments)
+    cases = tuple(TrialChute.of(experiment, chute, parameters) for experiment in measured.experiments)
     objective = Objective(cases, base_height, loss)
     _require_enough(objective)
     first = [np.array([parameter.of(chute) for parameter in parameters])]
@@ -308,7 +308,7 @@ def fit(
             others.append(best)
             best = _ended(objective, found.found)
     else:
-        raise SolveError("the fit goes on to better and better parameters: free fewer of them, or give other ranges")
+        raise SolveError("the fit keeps improving without converging: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
 
 
@@ -339,7 +339,7 @@ def _searched(objective: Objective, first: list[Array], trials: int | None) -> t
     return _searched_from(objective, candidates(objective, first, MANY_TRIALS))
 
 
-def _searched_from(objective: Objective, starts: Sequence[Candidate]) -> tuple[Minimum, list[Minimum]]:
+def _searched_from(objective: Objective, starts: Sequence[StartingPoint]) -> tuple[Minimum, list[Minimum]]:
     kept: list[Minimum] = []
     left = []
     for start in starts:
@@ -378,7 +378,7 @@ def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objectiv
     of them; and its minimum near ``one``."""
     relaxed = replace(objective, cases=tuple(case.relaxed(error) for case in objective.cases))
     values = one.x[: objective.parameters]
-    places = [Place.of(case, place.flow, values) for case, place in zip(relaxed.cases, one.places, strict=True)]
+    places = [TrialFlow.of(case, place.flow, values) for case, place in zip(relaxed.cases, one.places, strict=True)]
     x = relaxed.start(places)
     if objective.base_unknown:
         x[-len(places) :] = one.x[-len(places) :]
@@ -404,7 +404,7 @@ def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
     values = found.x[: objective.parameters]
     places = []
     for case, place in zip(objective.cases, found.places, strict=True):
-        start = Place.of(case, place.flow, values)
+        start = TrialFlow.of(case, place.flow, values)
         flow = case.followed(start, values, start.label)
         if flow is None:
             return None
@@ -545,7 +545,7 @@ def _outcome(
     )
 
 
-def _fitted(case: Case, place: Place, base: float | None, base_error: float | None) -> Fitted:
+def _fitted(case: TrialChute, place: TrialFlow, base: float | None, base_error: float | None) -> Fitted:
     residual = case.residual(place.flow, base or 0.0)
     profiles, first = [], 0
     for series in case.experiment.profiles:
@@ -555,7 +555,7 @@ def _fitted(case: Case, place: Place, base: float | None, base_error: float | No
     return Fitted(case.experiment.name, place.flow, rank, many, base, base_error, residual, tuple(profiles))
 
 
-def _rank(case: Case, place: Place) -> tuple[int, int]:
+def _rank(case: TrialChute, place: TrialFlow) -> tuple[int, int]:
     """Which of the flows with the same exact number, or the same hold-up, this is."""
     asked: dict[str, Any] = dict(case.experiment.exact) or {"M": place.flow.mass_holdup}
     found = flows(place.flow.chute, **asked, tolerance=1e-6)

@@ -15,7 +15,7 @@ from chuteflow.theory.constitutive import Law
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LawComparison:
     """Fits of several laws, by AICc from the best on; ``failed`` says why there is none for others."""
 
     fits: tuple[Fit, ...]
@@ -23,7 +23,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         said = ", ".join(f"{one.chute.closure} {delta:.1f}" for one, delta in zip(self.fits, self.deltas, strict=True))
-        return display.line("Comparison", f"AICc above the best: {said}")
+        return display.line("LawComparison", f"AICc above the best: {said}")
 
     @property
     def deltas(self) -> list[float]:
@@ -33,7 +33,7 @@ class Comparison:
 
 def compare(
     measured: Measurements, chute: Chute, free: Sequence[str], closures: Sequence[str | Law], **settings: Any
-) -> Comparison:
+) -> LawComparison:
     """Fit ``free`` parameters under each of ``closures``, see :func:`chuteflow.fitting.calibration.fit`.
 
     Raises:
@@ -51,4 +51,4 @@ def compare(
         if len(errors) == 1:
             raise errors[0]
         raise InputError("; ".join(dict.fromkeys(failed)))
-    return Comparison(tuple(sorted(found, key=lambda one: one.aicc)), tuple(failed))
+    return LawComparison(tuple(sorted(found, key=lambda one: one.aicc)), tuple(failed))

@@ -9,9 +9,9 @@ import numpy as np
 
 from chuteflow import display
 from chuteflow.errors import InputError
-from chuteflow.fitting.measurements import SCALARS, Errors, assembled
+from chuteflow.fitting.measurements import SCALARS, StandardErrors, assembled
 from chuteflow.fitting.objective import Objective
-from chuteflow.fitting.residuals import Case
+from chuteflow.fitting.residuals import TrialChute
 from chuteflow.fitting.starts import candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import CONDITIONS
@@ -29,7 +29,7 @@ _SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class DesignSolution:
     """A chute that meets the conditions: ``values`` of its unknown parameters, and its flow."""
 
     values: Array
@@ -42,7 +42,7 @@ class Design:
 
     unknown: tuple[FreeParameter, ...]
     wanted: Mapping[str, float]
-    solutions: tuple[Solution, ...]
+    solutions: tuple[DesignSolution, ...]
     starts: int
     reason: str | None
 
@@ -84,20 +84,20 @@ def design(
         if symbol not in SCALARS:
             raise InputError(f"unknown quantity {symbol!r}: choose from {', '.join(SCALARS)}")
     exact = next((symbol for symbol in CONDITIONS if symbol in wanted), None)
-    errors = {symbol: Errors(_ERROR, relative=True) for symbol in wanted if symbol != exact}
+    errors = {symbol: StandardErrors(_ERROR, relative=True) for symbol in wanted if symbol != exact}
     experiment = assembled("wanted", None, {}, wanted, errors, {}, {})
-    objective = Objective((Case.of(experiment, chute, parameters),), False, "linear")
+    objective = Objective((TrialChute.of(experiment, chute, parameters),), False, "linear")
     here = np.array([parameter.of(chute) for parameter in parameters])
     try:
         starts = candidates(objective, [here], _TRIALS, _FOLLOWED)
     except InputError:
         return Design(parameters, wanted, (), 0, f"no trial chute has a flow with {exact} = {wanted[exact or '']:g}")
-    found: list[Solution] = []
+    found: list[DesignSolution] = []
     for start in starts:
         one = objective.minimise(objective.start(start.places), start.places, most=_MOST, tolerance=1e-14)
         if one is not None and one.chi2 < _MET:
-            found.append(Solution(one.x[: len(parameters)].copy(), one.places[0].flow))
-    distinct: list[Solution] = []
+            found.append(DesignSolution(one.x[: len(parameters)].copy(), one.places[0].flow))
+    distinct: list[DesignSolution] = []
     for one in sorted(found, key=lambda s: tuple(s.values)):
         if not any(_same(one, other) for other in distinct):
             distinct.append(one)
@@ -107,6 +107,6 @@ def design(
     return Design(parameters, wanted, tuple(distinct), len(starts), reason)
 
 
-def _same(one: Solution, other: Solution) -> bool:
+def _same(one: DesignSolution, other: DesignSolution) -> bool:
     off = np.abs(one.flow.solution.macroscopic - other.flow.solution.macroscopic).max()
     return bool(np.abs(one.values - other.values).max() < _SAME and off < _SAME)

@@ -32,7 +32,7 @@ _TAIL_ERROR = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredFunction:
     """A function of the volume fraction as it was measured (m,), its standard errors, and what the law gives there.
 
     ``ratio_error`` is the standard error of the measured value over that of the law, which has one too, as the volume
@@ -61,9 +61,9 @@ class DirectMeasurement:
     name: str
     height: Array
     nu: Array
-    g1: Measured
-    g2: Measured | None
-    slip: Measured | None
+    g1: MeasuredFunction
+    g2: MeasuredFunction | None
+    slip: MeasuredFunction | None
     closure: str
 
 
@@ -162,9 +162,9 @@ def _at_base(z: Array) -> Array:
     return out
 
 
-def _summed(draws: Array, law: Array) -> Measured:
+def _summed(draws: Array, law: Array) -> MeasuredFunction:
     """The first draw, which is without noise, and how far the others spread."""
-    return Measured(draws[0], _width(draws[1:]), law[0], _width(draws[1:] / law[1:]))
+    return MeasuredFunction(draws[0], _width(draws[1:]), law[0], _width(draws[1:] / law[1:]))
 
 
 def _width(draws: Array) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.fitting.objective import Minimum, Objective
-from chuteflow.fitting.residuals import Place
+from chuteflow.fitting.residuals import TrialFlow
 from chuteflow.numerics.chebyshev import Array
 
 #: How an interval can end, and what that means.
@@ -64,7 +64,7 @@ class Interval:
 
 
 class BetterFit(Exception):
-    """A better fit than the one whose intervals were asked for."""
+    """A better fit than the one whose intervals were requested."""
 
     def __init__(self, found: Minimum) -> None:
         super().__init__()
@@ -89,13 +89,13 @@ def interval(
     Raises:
         BetterFit: where chi2 falls below it on the way.
     """
-    low, low_end = _Side(objective, best, covariance, which, rise, -1.0, known, onward).end()
-    high, high_end = _Side(objective, best, covariance, which, rise, 1.0, known, onward).end()
+    low, low_end = _IntervalSide(objective, best, covariance, which, rise, -1.0, known, onward).end()
+    high, high_end = _IntervalSide(objective, best, covariance, which, rise, 1.0, known, onward).end()
     return Interval(low, high, (low_end, high_end))
 
 
 @dataclass(eq=False)
-class _Side:
+class _IntervalSide:
     """One side of an interval, which fits with a fixed parameter follow outward step by step."""
 
     objective: Objective
@@ -175,7 +175,7 @@ class _Side:
         found: Minimum | None = None
         for start in self._starts(value, inside, before):
             start[self.which] = value
-            places: Sequence[Place] = inside.places
+            places: Sequence[TrialFlow] = inside.places
             found = self.objective.minimise(start, places, most=_MOST, fixed=self.which, tolerance=_TOLERANCE)
             if found is not None and found.chi2 < self.best.chi2 - _BETTER * self.rise:
                 raise BetterFit(found)

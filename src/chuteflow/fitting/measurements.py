@@ -91,7 +91,7 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Experiments that are fitted together. ``errors_known`` tells whether errors were given, or are to be estimated;
+    """Experiments that are fitted together. ``errors_known`` is whether errors were given, or are to be estimated;
     ``in_units`` whether the values were made dimensionless by the slope."""
 
     experiments: tuple[Experiment, ...]
@@ -109,7 +109,7 @@ class Measurements:
 
 
 @dataclass(frozen=True)
-class Errors:
+class StandardErrors:
     """Standard errors of one quantity: ``values`` are absolute, or fractions where ``relative``."""
 
     values: Any
@@ -145,8 +145,8 @@ def measurements(
     Raises:
         InputError: for values that no flow has, heights that do not rise, errors that are not positive, or too few.
     """
-    said = {key: Errors(value) for key, value in (errors or {}).items()}
-    said |= {key: Errors(value, relative=True) for key, value in (relative_errors or {}).items()}
+    said = {key: StandardErrors(value) for key, value in (errors or {}).items()}
+    said |= {key: StandardErrors(value, relative=True) for key, value in (relative_errors or {}).items()}
     profiles = {key: value for key, value in (("nu", nu), ("T", T), ("u", u)) if value is not None}
     return together([assembled(name, z, profiles, numbers or {}, said, given or {}, trust or {})])
 
@@ -187,7 +187,7 @@ def assembled(
     z: ArrayLike | None,
     profiles: Mapping[str, ArrayLike],
     numbers: Mapping[str, float],
-    errors: Mapping[str, Errors],
+    errors: Mapping[str, StandardErrors],
     given: Mapping[str, float],
     trust: Mapping[str, tuple[float, float]],
 ) -> Experiment:
@@ -252,7 +252,7 @@ def _series(
     symbol: str,
     heights: tuple[Array, Mask],
     values: ArrayLike,
-    errors: Errors | None,
+    errors: StandardErrors | None,
     trust: Mapping[str, tuple[float, float]],
 ) -> Series:
     if symbol not in PROFILES:
@@ -289,14 +289,14 @@ def _series(
     return Series(symbol, z[used], value[used], spread[used], relative)
 
 
-def _scalar(what: str, symbol: str, value: float, errors: Errors | None) -> Scalar:
+def _scalar(what: str, symbol: str, value: float, errors: StandardErrors | None) -> Scalar:
     if errors is None:
         return Scalar(symbol, value, np.nan, True)
     spread = _spread(what, symbol, errors, 1, np.ones(1, dtype=bool))
     return Scalar(symbol, value, float(spread[0]), errors.relative)
 
 
-def _spread(what: str, symbol: str, errors: Errors, size: int, used: Any) -> Array:
+def _spread(what: str, symbol: str, errors: StandardErrors, size: int, used: Any) -> Array:
     found = real_array(f"errors of {symbol}", errors.values).ravel()
     if found.size not in (1, size):
         raise InputError(f"{what}{symbol}: {found.size} errors for {size} values")

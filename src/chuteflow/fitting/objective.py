@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from chuteflow.fitting.residuals import MOST_OFFSET, Case, Linear, Place
+from chuteflow.fitting.residuals import MOST_OFFSET, Linear, TrialChute, TrialFlow
 from chuteflow.numerics.chebyshev import Array
 
 #: Loss functions of :func:`scipy.optimize.least_squares`, by choice.
@@ -31,7 +31,7 @@ class Minimum:
     chi2: float
     residual: Array
     jacobian: Array
-    places: tuple[Place, ...]
+    places: tuple[TrialFlow, ...]
     converged: bool
 
 
@@ -40,7 +40,7 @@ class Objective:
     """Residuals of all ``cases`` as a function of the unknowns x (p,): free parameters, places of flows without an
     exact number, and heights of the bases where they are unknown."""
 
-    cases: tuple[Case, ...]
+    cases: tuple[TrialChute, ...]
     base_unknown: bool
     loss: str
 
@@ -87,7 +87,7 @@ class Objective:
         bases = [_BASE_SCALE] * (len(self.cases) * self.base_unknown)
         return np.array([*widths, *[_PLACE_SCALE] * len(self.labelled), *bases])
 
-    def start(self, places: Sequence[Place]) -> Array:
+    def start(self, places: Sequence[TrialFlow]) -> Array:
         """The unknowns at which the flows are these."""
         x = np.zeros(self.unknowns)
         x[: self.parameters] = places[0].values
@@ -98,7 +98,7 @@ class Objective:
     def minimise(
         self,
         x: Array,
-        places: Sequence[Place],
+        places: Sequence[TrialFlow],
         *,
         most: int,
         fixed: int | None = None,
@@ -110,9 +110,9 @@ class Objective:
         ``known``."""
         from scipy.optimize import least_squares
 
-        run = _Run(self, tuple(places), x.copy(), [j for j in range(self.unknowns) if j != fixed], tuple(known))
+        moving = [j for j in range(self.unknowns) if j != fixed]
+        run = _Minimisation(self, tuple(places), x.copy(), moving, tuple(known))
         low, high = self.bounds()
-        moving = run.moving
         x[moving] = np.clip(x[moving], low[moving], high[moving])
         first = run.residual(x[moving])
         if not np.isfinite(first).all():
@@ -159,15 +159,15 @@ class _OnTheWayError(Exception):
 
 
 @dataclass(eq=False)
-class _Run:
+class _Minimisation:
     """One minimisation: where the flows were last accepted, and where they were tried; what is ``known`` ends it."""
 
     objective: Objective
-    places: tuple[Place, ...]
+    places: tuple[TrialFlow, ...]
     x: Array
     moving: list[int]
     known: tuple[Minimum, ...] = ()
-    _tried: tuple[Array, tuple[Place, ...]] | None = None
+    _tried: tuple[Array, tuple[TrialFlow, ...]] | None = None
 
     def residual(self, part: Array) -> Array:
         """All residuals (n,); infinite where a flow is not found."""
@@ -205,12 +205,12 @@ class _Run:
                 raise _OnTheWayError
         return out[:, self.moving]
 
-    def accepted(self, part: Array) -> tuple[Place, ...]:
+    def accepted(self, part: Array) -> tuple[TrialFlow, ...]:
         """The flows at these unknowns, followed from where they were accepted; none where one is not found."""
         self.x[self.moving] = part
         if self._tried is not None and np.array_equal(self._tried[0], part):
             return self._tried[1]
-        found: list[Place] = []
+        found: list[TrialFlow] = []
         values = self.x[: self.objective.parameters].copy()
         for i, (case, place) in enumerate(zip(self.objective.cases, self.places, strict=True)):
             column = self.objective.label_column(i)

@@ -80,9 +80,9 @@ class PredictedFold:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What a calibration says of a chute: its flows with errors; its curve with bands and folds, where asked for.
+    """What a calibration says of a chute: its flows with errors; its curve with bands and folds, where requested.
 
-    ``widths`` standard errors are the confidence asked for. ``warnings`` are sentences.
+    ``widths`` standard errors are the requested confidence. ``warnings`` are sentences.
     """
 
     calibration: Calibration
@@ -103,7 +103,7 @@ class Prediction:
 
     @cached_property
     def curve(self) -> Curve:
-        """The families of flows."""
+        """The branches of flows."""
         return curve(self.calibration.chute, points=_POINTS)
 
     @cached_property

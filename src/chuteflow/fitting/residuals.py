@@ -35,9 +35,9 @@ _TOLERANCE, _ROUGH = 1e-9, 1e-6
 _HALVINGS = 4
 #: A flow is taken for the one before where it has moved by no more than this beyond twice what was expected.
 _STRAYED = 0.1
-#: Hold-ups at which flows are looked for where no measurement tells one.
+#: Hold-ups at which flows are searched for where no measurement tells one.
 _HOLDUPS = (0.3, 0.6, 1.2, 2.5, 5.0)
-#: A base is looked for within this many diameters of where the heights put it.
+#: A base is searched for within this many diameters of where the heights put it.
 MOST_OFFSET = 3.0
 
 
@@ -53,7 +53,7 @@ class Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class TrialChute:
     """An experiment on its chute, of which some parameters are ``free``."""
 
     experiment: Experiment
@@ -61,7 +61,7 @@ class Case:
     free: tuple[FreeParameter, ...]
 
     @classmethod
-    def of(cls, experiment: Experiment, chute: Chute, free: Sequence[FreeParameter]) -> Case:
+    def of(cls, experiment: Experiment, chute: Chute, free: Sequence[FreeParameter]) -> TrialChute:
         """The case of an experiment; what is known of its own chute replaces what is said for all.
 
         Raises:
@@ -73,7 +73,7 @@ class Case:
         own = {BY_KEY[key].name: value for key, value in experiment.given.items()}
         return cls(experiment, replace(chute, **own), tuple(free))
 
-    def relaxed(self, error: float) -> Case:
+    def relaxed(self, error: float) -> TrialChute:
         """The same with the number that is known exactly known to a relative ``error``."""
         experiment = self.experiment
         more = tuple(Scalar(key, value, error, True) for key, value in experiment.exact.items())
@@ -115,7 +115,7 @@ class Case:
 
     @cached_property
     def _asked(self) -> list[dict[str, float]]:
-        """What flows are looked for by: an exact number, else a measured one, else hold-ups."""
+        """What flows are searched for by: an exact number, else a measured one, else hold-ups."""
         experiment = self.experiment
         if experiment.exact:
             return [dict(experiment.exact)]
@@ -129,12 +129,12 @@ class Case:
             return [{"M": within + float(nu.value[0] * max(nu.height[0], 0.0))}]
         return [{"M": holdup} for holdup in _HOLDUPS]
 
-    def followed(self, start: Place, values: Array, label: float) -> Flow | None:
+    def followed(self, start: TrialFlow, values: Array, label: float) -> Flow | None:
         """The flow at other values of the free parameters and another place on the branch, or None where there is none
         nearby."""
         return self._followed(start, values, label, _HALVINGS)
 
-    def _followed(self, start: Place, values: Array, label: float, halvings: int) -> Flow | None:
+    def _followed(self, start: TrialFlow, values: Array, label: float, halvings: int) -> Flow | None:
         try:
             chute = self.at(values)
             problem = self._model(chute)
@@ -153,7 +153,7 @@ class Case:
         half = self._followed(start, middle, between, halvings - 1)
         if half is None:
             return None
-        return self._followed(Place(half, middle, start.weights, between), values, label, halvings - 1)
+        return self._followed(TrialFlow(half, middle, start.weights, between), values, label, halvings - 1)
 
     def _model(self, chute: Chute) -> Model:
         """The model of a chute, in a way that leaves the tables of its derivatives at hand: they are asked for next."""
@@ -183,7 +183,7 @@ class Case:
             parts.append(_residual(computed, np.array([scalar.value]), np.array([scalar.error]), scalar.relative))
         return np.concatenate([np.empty(0), *parts])
 
-    def linear(self, place: Place, base: float = 0.0) -> Linear:
+    def linear(self, place: TrialFlow, base: float = 0.0) -> Linear:
         """The residual and its derivatives at the flow of ``place``."""
         answer = place.answer
         parts, by_parameters, by_place, by_base = [], [], [], []
@@ -220,7 +220,7 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class TrialFlow:
     """The flow of an experiment at ``values`` of the free parameters; ``label`` = weights . m is its place on the
     branch, which a free one keeps by its ``weights``."""
 
@@ -231,7 +231,7 @@ class Place:
     free: tuple[FreeParameter, ...] = ()
 
     @classmethod
-    def of(cls, case: Case, flow: Flow, values: Array) -> Place:
+    def of(cls, case: TrialChute, flow: Flow, values: Array) -> TrialFlow:
         """The place of a flow that was found, with weights along its branch, or those of the exact number."""
         if case.exact is not None:
             return cls(flow, values, case.exact.weights, case.exact.value, case.free)
@@ -240,7 +240,7 @@ class Place:
         a, b, c, d = tangent.tolist()
         return cls(flow, values, (a, b, c, d), float(tangent @ flow.solution.macroscopic), case.free)
 
-    def moved(self, flow: Flow, values: Array, label: float) -> Place:
+    def moved(self, flow: Flow, values: Array, label: float) -> TrialFlow:
         """The place of the flow that was followed from here."""
         return replace(self, flow=flow, values=values, label=label)
 
@@ -253,8 +253,8 @@ class Place:
         """Derivatives with respect to the parameters (k, m) at a fixed label, and to the label (m,), of what changes
         ``along`` the branch (m,) and ``across`` it (k, m)."""
         weights = np.array(self.weights)
-        pace = float(weights @ self.answer.tangent)
-        return across - (weights @ self.answer.across)[:, None] * along / pace, along / pace
+        label_rate = float(weights @ self.answer.tangent)
+        return across - (weights @ self.answer.across)[:, None] * along / label_rate, along / label_rate
 
     def expected(self, values: Array, label: float) -> float:
         """How far the flow moves in m, as far as is known."""

@@ -7,20 +7,20 @@ estimated, then at that size.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
 from chuteflow import display
 from chuteflow.checks import whole
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 from chuteflow.fitting.calibration import Fit
 from chuteflow.fitting.objective import Objective
-from chuteflow.fitting.residuals import Case, Place
+from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.threads import on_one_thread
 
-#: Steps of each walker, and the share of them that is thrown away.
+#: Steps of each walker, and the fraction of them that is thrown away.
 _STEPS, _SHARE_OF_START = 400, 0.25
 #: Walkers for each unknown.
 _WALKERS = 4
@@ -40,7 +40,7 @@ class Posterior:
         return display.line("Posterior", display.counted(len(self.draws), "draw"), ", ".join(self.keys))
 
     def interval(self, key: str, confidence: float = 0.95) -> tuple[float, float]:
-        """The central interval of a parameter that holds a share ``confidence`` of the draws.
+        """The central interval of a parameter that holds a fraction ``confidence`` of the draws.
 
         Raises:
             InputError: for a parameter that was not free.
@@ -64,22 +64,19 @@ def sample(found: Fit, *, steps: int = _STEPS, seed: int = 0) -> Posterior:
     Raises:
         InputError: without emcee, or for a fit of another kind.
     """
-    try:
-        emcee = import_module("emcee")
-    except ImportError:
-        raise InputError("sampling needs emcee: install chuteflow[bayes]") from None
+    emcee = require("emcee", "bayes", "sampling")
     if found.loss != "linear" or any(one.base is not None for one in found.experiments):
         raise InputError("sampling knows fits with a linear loss and known heights of the bases")
     steps = whole("steps", steps, 8, 1_000_000)
-    posterior = _Posterior.of(found)
+    posterior = _LogPosterior.of(found)
     rng = np.random.default_rng(seed)
     unknowns = posterior.objective.unknowns
     walkers = max(_WALKERS * unknowns, 8)
     spread = np.full(unknowns, 1e-3)
     spread[: len(found.free)] = np.sqrt(np.diag(found.covariance))
     low, high = posterior.objective.bounds()
-    room = np.minimum(np.where(np.isfinite(high - low), 0.05 * (high - low), np.inf), spread)
-    start = np.clip(posterior.centre + room * rng.standard_normal((walkers, unknowns)), low + 1e-9, high - 1e-9)
+    width = np.minimum(np.where(np.isfinite(high - low), 0.05 * (high - low), np.inf), spread)
+    start = np.clip(posterior.centre + width * rng.standard_normal((walkers, unknowns)), low + 1e-9, high - 1e-9)
     sampler = emcee.EnsembleSampler(walkers, unknowns, posterior)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, steps, skip_initial_state_check=True)
@@ -94,21 +91,21 @@ def sample(found: Fit, *, steps: int = _STEPS, seed: int = 0) -> Posterior:
 
 
 @dataclass(eq=False)
-class _Posterior:
+class _LogPosterior:
     """The logarithm of the posterior density; flows are followed from the fit."""
 
     objective: Objective
-    places: tuple[Place, ...]
+    places: tuple[TrialFlow, ...]
     centre: Array
     scale: float
 
     @classmethod
-    def of(cls, found: Fit) -> _Posterior:
+    def of(cls, found: Fit) -> _LogPosterior:
         """That of a fit."""
-        cases = tuple(Case.of(one, found.chute, found.free) for one in found.measured.experiments)
+        cases = tuple(TrialChute.of(one, found.chute, found.free) for one in found.measured.experiments)
         objective = Objective(cases, False, found.loss)
         places = tuple(
-            Place.of(case, one.flow, found.values) for case, one in zip(cases, found.experiments, strict=True)
+            TrialFlow.of(case, one.flow, found.values) for case, one in zip(cases, found.experiments, strict=True)
         )
         for place in places:
             # Its derivatives say how far flows move.

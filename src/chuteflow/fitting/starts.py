@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.fitting.objective import Objective
-from chuteflow.fitting.residuals import Place
+from chuteflow.fitting.residuals import TrialFlow
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.sobol import MOST_DIMENSIONS, Sobol
 
@@ -22,19 +22,19 @@ _SENSELESS = 1e4
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class StartingPoint:
     """A flow for each experiment at one set of parameters; ``ranks`` (number among the flows, how many) from hot to
     cold, and the ``cost``, which grows slowly with bad residuals."""
 
     values: Array
-    places: tuple[Place, ...]
+    places: tuple[TrialFlow, ...]
     ranks: tuple[tuple[int, int], ...]
     cost: float
 
 
 def candidates(
     objective: Objective, first: Sequence[Array], trials: int | None = None, most: int = _FOLLOWED
-) -> list[Candidate]:
+) -> list[StartingPoint]:
     """Candidates from the parameters ``first`` and from trial chutes, the best first, without near repetitions: about
     ``most`` of them.
 
@@ -48,7 +48,7 @@ def candidates(
     spread = Sobol(len(free), seed=0).points(0, many) if free else np.empty((1, 0))
     low = np.array([parameter.likely[0] for parameter in free])
     width = np.array([parameter.likely[1] for parameter in free]) - low
-    found: list[Candidate] = []
+    found: list[StartingPoint] = []
     for values in (*first, *(low + width * spread)):
         found += at(objective, np.asarray(values, dtype=float))
     if not found:
@@ -58,7 +58,7 @@ def candidates(
     return _distinct(sorted(found, key=lambda one: one.cost), width, most)
 
 
-def at(objective: Objective, values: Array) -> list[Candidate]:
+def at(objective: Objective, values: Array) -> list[StartingPoint]:
     """The candidates at these parameters: for one experiment each of its flows, for several the best of each."""
     options = []
     for case in objective.cases:
@@ -73,9 +73,9 @@ def at(objective: Objective, values: Array) -> list[Candidate]:
             return []
     picked = [[one] for one in options[0]] if len(options) == 1 else [[one[0] for one in options]]
     return [
-        Candidate(
+        StartingPoint(
             values,
-            tuple(Place.of(case, flow, values) for case, (_, flow, _) in zip(objective.cases, choice, strict=True)),
+            tuple(TrialFlow.of(case, flow, values) for case, (_, flow, _) in zip(objective.cases, choice, strict=True)),
             tuple(rank for _, _, rank in choice),
             float(sum(cost for cost, _, _ in choice)),
         )
@@ -88,9 +88,9 @@ def _cost(residual: Array) -> float:
     return float(np.log1p(residual**2).sum()) if sensible else np.inf
 
 
-def _distinct(found: Sequence[Candidate], width: Array, most: int) -> list[Candidate]:
+def _distinct(found: Sequence[StartingPoint], width: Array, most: int) -> list[StartingPoint]:
     """The best, those that are far from them or on another flow, and at least one of each rank."""
-    kept: list[Candidate] = []
+    kept: list[StartingPoint] = []
     for one in found:
         near = any(
             one.ranks == other.ranks and np.abs((one.values - other.values) / width).max(initial=0.0) < _APART

@@ -13,12 +13,11 @@ import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet
 from chuteflow.io import contract
-from chuteflow.io.contract import PLACE, SHORT, finite
+from chuteflow.io.contract import PLACE, SHORT, finite, place_object, places_object
 from chuteflow.io.csv_file import write_columns
 from chuteflow.io.datasets import dataset
 from chuteflow.io.writing import as_text, require_writable, write_whole
-from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import Scales
 
 
 def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[str, Any]:
@@ -60,23 +59,19 @@ def save(found: BoundarySet, path: str | os.PathLike[str], *, scales: Scales | N
 def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[str, Any]:
     return {
         second: boundary.parameter.tolist(),
-        **{NUMBERS[name].symbol: [finite(_scaled(f, name, scales)) for f in boundary.flows] for name in PLACE},
+        **places_object(boundary.flows, scales),
         "error": [finite(v) for v in boundary.error],
         "special": [
             {
                 "kind": turn.kind,
                 second: getattr(turn.flow.chute, boundary.second),
-                **{NUMBERS[name].symbol: finite(_scaled(turn.flow, name, scales)) for name in PLACE},
+                **place_object(turn.flow, scales),
                 "error": finite(turn.error),
             }
             for turn in boundary.special
         ],
         "ends": list(boundary.ends),
     }
-
-
-def _scaled(flow: Flow, name: str, scales: Scales | None) -> float:
-    return getattr(flow, name) * contract.factor(name, flow.chute, scales)
 
 
 def _write_json(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:

@@ -18,7 +18,7 @@ from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
 from chuteflow.io.units import read_si
 from chuteflow.parameters import BY_KEY
-from chuteflow.steady.cases import GRAINS, Case, Known, case, nearest_names
+from chuteflow.steady.cases import GRAINS, Case, CaseNumber, case, nearest_names
 from chuteflow.steady.chute import slope_of
 
 #: Names of the model.
@@ -74,17 +74,17 @@ def _flat(found: Mapping[str, Any]) -> dict[str, Any]:
 
 def _case(name: str, given: dict[str, Any]) -> Case:
     start = case(_text("case", given.pop("case"))) if "case" in given else Case(name, "", {})
-    own: dict[str, Known] = {}
+    own: dict[str, CaseNumber] = {}
     for key in [one for one in given if one in _NUMBERS]:
         if _NUMBERS[key] in own:
             raise InputError(f"{_NUMBERS[key]} is given twice, also as {key}")
-        own[_NUMBERS[key]] = Known(number(key, given[key]))
+        own[_NUMBERS[key]] = CaseNumber(number(key, given[key]))
     if "angle" in given:
         if "slope" in own:
             raise InputError("slope and angle: give one of them, not both")
-        own["slope"] = Known(slope_of(given["angle"]))
+        own["slope"] = CaseNumber(slope_of(given["angle"]))
     names = {one: _text(one, given[one]) for one in _NAMES if one in given}
-    grains = {one: Known(_amount(one, given[one])) for one in GRAINS if one in given}
+    grains = {one: CaseNumber(_amount(one, given[one])) for one in GRAINS if one in given}
     return Case(
         name,
         f"{start.description or 'the chute'} of {name}",

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
-from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Branch, Curve, FlowSet, Searched
 from chuteflow.errors import InputError
@@ -156,6 +156,17 @@ def _not_finite(word: str) -> NoReturn:
     raise InputError(f"{word} is in it: numbers must be finite")
 
 
+def place_object(flow: Flow, scales: Scales | None = None) -> dict[str, Any]:
+    """Where a flow is on its branch: Q, h, M and T_surface."""
+    return _numbers(flow, PLACE, scales)
+
+
+def places_object(flows: Iterable[Flow], scales: Scales | None = None) -> dict[str, list[Any]]:
+    """The same of several flows, as lists."""
+    places = [place_object(flow, scales) for flow in flows]
+    return {NUMBERS[name].symbol: [place[NUMBERS[name].symbol] for place in places] for name in PLACE}
+
+
 def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[str, float | str | None]:
     return {NUMBERS[name].symbol: finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in names}
 
@@ -172,7 +183,7 @@ def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, An
     return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
 
 
-def _count(chute: Chute, count: Count, scales: Scales | None) -> dict[str, Any]:
+def _count(chute: Chute, count: FlowCount, scales: Scales | None) -> dict[str, Any]:
     flux = factor("mass_flux", chute, scales)
     return {
         "Q_from": count.low * flux,

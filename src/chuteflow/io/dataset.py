@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.errors import InputError
+from chuteflow.extras import require
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -73,7 +72,7 @@ class Dataset:
         Raises:
             InputError: where xarray is not installed.
         """
-        xr = _needed("xarray", "to_xarray")
+        xr = require("xarray", "tables", "to_xarray")
         variables = {name: (one.dimensions, one.values, dict(one.attributes)) for name, one in self.variables.items()}
         coordinates = {name: variables.pop(name) for name in self.index}
         return xr.Dataset(variables, coordinates, dict(self.attributes))
@@ -84,7 +83,7 @@ class Dataset:
         Raises:
             InputError: where pandas is not installed.
         """
-        pd = _needed("pandas", "to_dataframe")
+        pd = require("pandas", "tables", "to_dataframe")
         columns = self.columns()
         table = pd.DataFrame(columns)
         return table.set_index([name for name in self.index if name in columns]) if self.index else table
@@ -122,10 +121,3 @@ def _spread(values: NDArray[Any], dimensions: tuple[str, ...], sizes: Mapping[st
     values = values.transpose([dimensions.index(name) for name in order])
     shape = [sizes[name] if name in dimensions else 1 for name in sizes]
     return np.broadcast_to(values.reshape(shape), tuple(sizes.values())).ravel()
-
-
-def _needed(name: str, what: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise InputError(f"{what} needs {name}, which is not installed: pip install {name}") from None

@@ -23,17 +23,17 @@ from chuteflow.maps.kinds import DENSITIES as DENSITY_BITS
 from chuteflow.maps.kinds import INTERIORS as INTERIOR_BITS
 from chuteflow.stability.planes import FamilyMap, WaveMap
 from chuteflow.stability.relaxation import Relaxation
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.hot import HotModel
 from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.steady.quantities import FIELDS, NUMBERS, PLACE, SCALED, VALIDITY, Quantity, Scales
-from chuteflow.steady.solver import Status
+from chuteflow.steady.solver import SolverStatus
 from chuteflow.steady.validity import WORDS
 from chuteflow.sweeps.scan import Scan
 
-_STATUS = tuple(status.name.lower() for status in Status)
+_STATUS = tuple(status.name.lower() for status in SolverStatus)
 #: Numbers of a cell of a domain: what they mean, and what their values mean, or the bits of which they are sums.
 CLASSES: dict[str, tuple[str, dict[int, str]]] = {
     "hot": (
@@ -42,9 +42,9 @@ CLASSES: dict[str, tuple[str, dict[int, str]]] = {
     ),
     "exists": ("any flow in the range searched", {0: "no_flow", 1: "flows"}),
     "most": ("largest number of flows that share one mass flux", {}),
-    "families": ("number of families, connected sets of flows", {}),
+    "families": ("number of branches, connected sets of flows", {}),
     "hidden": (
-        "hidden families: more than one, so that a continuation from a known flow does not meet all",
+        "hidden branches: more than one, so that a continuation from a known flow does not meet all",
         {0: "none", 1: "hidden_families"},
     ),
     "interior": ("kinds of interior among the flows", {bit: name for name, bit in INTERIOR_BITS.items()}),
@@ -61,7 +61,7 @@ def dataset(result: Any, scales: Scales | None = None) -> Dataset:
     Raises:
         InputError: for what is no result, or cannot take SI units.
     """
-    raise InputError(f"a {type(result).__name__} is no table: take a result of which there are several numbers")
+    raise InputError(f"a {type(result).__name__} is no table: take a result with several numbers")
 
 
 # Flows
@@ -170,7 +170,7 @@ def flow_variables(found: Sequence[Row], scales: Scales | None) -> dict[str, Var
 
 
 def _validity(flows: Sequence[Flow]) -> dict[str, Variable]:
-    """Numbers that tell how far flows keep to the theory, and a bit for each limit that is passed."""
+    """Numbers that show how far flows keep to the theory, and a bit for each limit that is passed."""
     known = [flow.validity for flow in flows]
     numbers = {
         name: Variable(
@@ -197,7 +197,7 @@ def _places(found: Sequence[Row]) -> dict[str, Variable]:
     comment = "; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items())
     kinds = [row.special or "none" for row in found]
     return {
-        "branch": Variable(("flow",), branch, {"long_name": "number of the family of flows", "units": "1"}),
+        "branch": Variable(("flow",), branch, {"long_name": "number of the branch of flows", "units": "1"}),
         "special_kind": flags(("flow",), kinds, ("none", *KINDS), "kind of special point", comment),
     }
 
@@ -307,7 +307,7 @@ def _along_boundaries(boundaries: Sequence[Boundary], second: str, scales: Scale
 @dataset.register(Domain)
 def _of_domain(result: Domain, scales: Scales | None = None) -> Dataset:
     if scales is not None:
-        raise InputError("a domain has no units: take it without scales")
+        raise InputError("a domain has no units: omit scales")
     plane = result.plane
     x, y = plane.x.name, plane.y.name
     variables = {
@@ -338,7 +338,7 @@ def _about_domain(found: Domain) -> dict[str, Any]:
         **fixed,
         **_searched(found.searched),
         "tolerance": found.tolerance,
-        "tolerance_comment": "share of each axis to which boundaries are located",
+        "tolerance_comment": "fraction of each axis to which boundaries are located",
     }
 
 
@@ -408,7 +408,7 @@ def _of_family(result: FamilyMap, scales: Scales | None = None) -> Dataset:
 def _growth(
     dimensions: tuple[str, str], found: WaveMap | FamilyMap, chute: Chute, scales: Scales | None
 ) -> dict[str, Variable]:
-    """Growth and frequency over two dimensions; NaN where none is told."""
+    """Growth and frequency over two dimensions; NaN where none is resolved."""
     known = np.where(found.unresolved, "not_known", np.where(found.grows, "grows", "does_not_grow"))
     meanings = ("does_not_grow", "grows", "not_known")
     state = flags(dimensions, known.ravel().tolist(), meanings, "whether a disturbance grows")
@@ -427,7 +427,7 @@ def _growth(
 def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
     chute, mode = result.flow.chute, result.mode
     numbers = {name: getattr(result.flow, name) * factor(name, chute, scales) for name in PLACE}
-    told = {} if mode is None else {"kx": mode.kx, "ky": mode.ky, "growth": mode.growth, "frequency": mode.frequency}
+    rates = {} if mode is None else {"kx": mode.kx, "ky": mode.ky, "growth": mode.growth, "frequency": mode.frequency}
     scale: dict[str, str] = {"kx": "wavenumber", "ky": "wavenumber"}
     known = {True: "stable", False: "unstable", None: "not_known"}[result.stable]
     return Dataset(
@@ -445,7 +445,7 @@ def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
                     f"{name} of the mode that grows fastest",
                     _unit(scale.get(name, name), scales),
                 )
-                for name, value in told.items()
+                for name, value in rates.items()
             },
         },
         chute.as_dict(),

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from chuteflow import __version__
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import checked_size, number, whole
 from chuteflow.errors import InputError
 from chuteflow.io import contract
@@ -35,8 +35,8 @@ from chuteflow.io.records import (
 )
 from chuteflow.io.references import PAPER, numbers_are
 from chuteflow.io.writing import as_text
-from chuteflow.maps import KINDS_OF_BOUNDARIES, Axis, Boundary, Domain, Plane
-from chuteflow.maps.columns import Column, Part
+from chuteflow.maps import KINDS_OF_BOUNDARIES, Domain, Outline, ParameterAxis, ParameterPlane
+from chuteflow.maps.columns import Column, PiecewiseConstant
 from chuteflow.maps.domain import COARSEST, FINEST, LARGEST_SIZE
 from chuteflow.maps.plane import CODES, HOT_CODES
 from chuteflow.steady.quantities import Scales
@@ -83,7 +83,7 @@ def in_si(found: Domain, scales: Scales | None) -> dict[str, Any]:
 
 
 def shares(found: Domain) -> dict[str, Any]:
-    """The share of the cells that has each value, number by number; of ``exists_at`` at each temperature."""
+    """The fraction of the cells that has each value, number by number; of ``exists_at`` at each temperature."""
     return {
         **{name: _shares(getattr(found, name)) for name in CLASSES},
         "exists_at": [_shares(layer) for layer in found.exists_at],
@@ -110,7 +110,7 @@ def _cells(found: Domain) -> dict[str, Any]:
     }
 
 
-def _boundary(one: Boundary) -> dict[str, Any]:
+def _boundary(one: Outline) -> dict[str, Any]:
     return {
         "kind": one.kind,
         "meaning": KINDS_OF_BOUNDARIES[one.kind],
@@ -156,11 +156,11 @@ def _restored(kept: Mapping[str, Any]) -> Domain:
     require_format(kept)
     chute = chute_from(kept)
     require_law(chute, kept)
-    x, y = (Axis(str(name), low, high) for name, low, high in kept["axes"])
+    x, y = (ParameterAxis(str(name), low, high) for name, low, high in kept["axes"])
     surface_temperature, deepest = kept["searched"]
-    within = Range.checked(surface_temperature, deepest, chute.surface)
+    within = SearchRange.checked(surface_temperature, deepest, chute.surface)
     temperatures = numbers("temperatures", kept["temperatures"])
-    plane = Plane(x, y, chute, tuple(temperatures.tolist()), within)
+    plane = ParameterPlane(x, y, chute, tuple(temperatures.tolist()), within)
     found = Domain.on_cells(
         plane,
         checked_size(kept["size"], 1, LARGEST_SIZE),
@@ -176,7 +176,7 @@ def _columns_from(kept: Sequence[Any], count: int) -> tuple[Column, ...]:
     """Columns of ``count`` parts each.
 
     Raises:
-        InputError: for places or stops that are no shares of an axis, or do not rise.
+        InputError: for places or stops that are no fractions of an axis, or do not rise.
     """
     places = _shares_from([place for place, _ in kept])
     columns = tuple(
@@ -188,17 +188,17 @@ def _columns_from(kept: Sequence[Any], count: int) -> tuple[Column, ...]:
     return columns
 
 
-def _part_from(stops: Any, values: Any) -> Part:
-    part = Part(_shares_from(stops), tuple(whole("a class", value, -1, 10**6) for value in values))
+def _part_from(stops: Any, values: Any) -> PiecewiseConstant:
+    part = PiecewiseConstant(_shares_from(stops), tuple(whole("a class", value, -1, 10**6) for value in values))
     if len(part.values) != len(part.stops) + 1:
         raise InputError("a column must have one class more than stops")
     return part
 
 
 def _shares_from(kept: Any) -> tuple[float, ...]:
-    found = tuple(number("a share of an axis", share, 0.0, 1.0) for share in kept)
+    found = tuple(number("a fraction of an axis", fraction, 0.0, 1.0) for fraction in kept)
     if any(one >= two for one, two in pairwise(found)):
-        raise InputError("shares of an axis must rise")
+        raise InputError("fractions of an axis must rise")
     return found
 
 

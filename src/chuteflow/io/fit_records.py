@@ -274,5 +274,5 @@ def _write(file: Any, found: Fit, content: bytes) -> None:
             file.dimensions[name] = len(residual)
             put(f"{name}_height", (name,), series.height, f"heights of {series.symbol} in experiment {one.name}")
             put(f"{name}_value", (name,), series.value, f"measured {series.symbol} in experiment {one.name}")
-            put(f"{name}_residual", (name,), residual, "computed less measured, in standard errors")
+            put(f"{name}_residual", (name,), residual, "computed minus measured, in standard errors")
     put("fit", ("byte",), np.frombuffer(content, dtype="u1"), "everything, as a JSON text")

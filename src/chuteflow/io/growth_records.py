@@ -13,9 +13,6 @@ from chuteflow.steady.quantities import NUMBERS, Scales
 if TYPE_CHECKING:
     from chuteflow.stability.neutral import NeutralCurve
     from chuteflow.stability.planes import FamilyMap, WaveMap
-    from chuteflow.steady.flow import Flow
-
-_ALONG = {"Q": "mass_flux", "h": "centre_of_mass", "M": "mass_holdup", "T_surface": "surface_temperature"}
 
 
 def wave_object(found: WaveMap, scales: Scales | None = None) -> dict[str, Any]:
@@ -54,24 +51,24 @@ def family_object(found: FamilyMap, scales: Scales | None = None) -> dict[str, A
         "chute": contract.chute_object(found.flows[0].chute),
         "angle": found.angle,
         "kh": found.depth_wavenumber.tolist(),
-        "flows": _numbers(found.flows, scales),
+        "flows": contract.places_object(found.flows, scales),
         "growth": _finite(rate * found.growth),
         "frequency": _finite(rate * found.frequency),
         "threshold": (rate * found.smallest_rate).tolist(),
         "growing": int(found.grows.sum()),
         "unresolved": [
-            {"kh": float(found.depth_wavenumber[i]), **_place(found.flows[j], scales)}
+            {"kh": float(found.depth_wavenumber[i]), **contract.place_object(found.flows[j], scales)}
             for i, j in np.argwhere(found.unresolved).tolist()
         ],
         "neutral": [
             {
                 "kh": curve.z[:, 0].tolist(),
-                **_numbers(flows, scales),
+                **contract.places_object(flows, scales),
                 **_of_curve(curve, rate, 1.0),
             }
             for curve, flows in zip(found.neutral, found.neutral_flows, strict=True)
         ],
-        **contract.units_object(scales, (*_ALONG.values(), "growth")),
+        **contract.units_object(scales, (*contract.PLACE, "growth")),
     }
 
 
@@ -88,9 +85,9 @@ def wave_rows(found: WaveMap, scales: Scales | None = None) -> Iterator[list[str
 def family_rows(found: FamilyMap, scales: Scales | None = None) -> Iterator[list[str]]:
     """The map as rows of CSV; an empty cell where growth is not known."""
     rate = contract.factor("growth", found.flows[0].chute, scales)
-    yield ["kh", *_ALONG, "growth", "frequency"]
+    yield ["kh", *(NUMBERS[name].symbol for name in contract.PLACE), "growth", "frequency"]
     for j, flow in enumerate(found.flows):
-        of_flow = [*_place(flow, scales).values()]
+        of_flow = [*contract.place_object(flow, scales).values()]
         for i, kh in enumerate(found.depth_wavenumber.tolist()):
             cells = (kh, *of_flow, rate * float(found.growth[i, j]), rate * float(found.frequency[i, j]))
             yield ["" if np.isnan(cell) else repr(cell) for cell in cells]
@@ -103,18 +100,6 @@ def _of_curve(curve: NeutralCurve, rate: float, error: float) -> dict[str, Any]:
         "error": (error * curve.error).tolist(),
         "ends": list(curve.ends),
     }
-
-
-def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
-    return {
-        symbol: float(getattr(flow, name)) * contract.factor(name, flow.chute, scales)
-        for symbol, name in _ALONG.items()
-    }
-
-
-def _numbers(flows: Any, scales: Scales | None) -> dict[str, list[float]]:
-    places = [_place(flow, scales) for flow in flows]
-    return {symbol: [place[symbol] for place in places] for symbol in _ALONG}
 
 
 def _finite(values: Any) -> list[list[float | None]]:

@@ -17,7 +17,15 @@ from pathlib import Path
 
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
-from chuteflow.fitting.measurements import PROFILES, SCALARS, Errors, Experiment, Measurements, assembled, together
+from chuteflow.fitting.measurements import (
+    PROFILES,
+    SCALARS,
+    Experiment,
+    Measurements,
+    StandardErrors,
+    assembled,
+    together,
+)
 from chuteflow.io.units import read_si
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.quantities import QUANTITIES, Scales
@@ -42,7 +50,7 @@ _WORDS_FOR_NOTHING = ("", "-", "na", "n/a")
 
 
 @dataclass(frozen=True)
-class _Column:
+class _MeasuredColumn:
     """One column: its title, what it holds, whether that is errors of it, and its unit, empty without one."""
 
     title: str
@@ -83,7 +91,7 @@ def read_measurements(
         raise InputError(f"{path}: {error}") from None
 
 
-def _table(path: Path) -> tuple[list[_Column], list[list[str]]]:
+def _table(path: Path) -> tuple[list[_MeasuredColumn], list[list[str]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -110,7 +118,7 @@ def _table(path: Path) -> tuple[list[_Column], list[list[str]]]:
     return columns, table[1:]
 
 
-def _column(title: str) -> _Column:
+def _column(title: str) -> _MeasuredColumn:
     match = _COLUMN.fullmatch(title)
     if match is None:
         raise InputError(f"column {shown(title)}: name it as in nu or z [mm]")
@@ -122,10 +130,10 @@ def _column(title: str) -> _Column:
     known = ("experiment", "z", *PROFILES, *SCALARS, *BY_KEY, "angle")
     if key not in known or (error and key not in PROFILES and key not in SCALARS):
         raise InputError(f"unknown column {shown(title)}: choose from {', '.join(known)}, and errors such as nu_error")
-    return _Column(title.strip(), key, error, unit)
+    return _MeasuredColumn(title.strip(), key, error, unit)
 
 
-def _grouped(columns: Sequence[_Column], rows: Sequence[list[str]]) -> dict[str, list[list[str]]]:
+def _grouped(columns: Sequence[_MeasuredColumn], rows: Sequence[list[str]]) -> dict[str, list[list[str]]]:
     place = next((i for i, column in enumerate(columns) if column.key == "experiment"), None)
     found: dict[str, list[list[str]]] = {}
     for row in rows:
@@ -135,7 +143,7 @@ def _grouped(columns: Sequence[_Column], rows: Sequence[list[str]]) -> dict[str,
 
 def _experiment(
     name: str,
-    columns: Sequence[_Column],
+    columns: Sequence[_MeasuredColumn],
     rows: Sequence[list[str]],
     slope: float | None,
     scales: Scales | None,
@@ -181,18 +189,18 @@ def _experiment(
         if column.key in numbers:
             if all(map(math.isnan, spread)):
                 continue
-            errors[column.key] = Errors(_single(name, column.title, spread), column.relative)
+            errors[column.key] = StandardErrors(_single(name, column.title, spread), column.relative)
         else:
             there = [error for error, value in zip(spread, profiles[column.key], strict=True) if not math.isnan(value)]
             if any(map(math.isnan, there)) and not all(map(math.isnan, there)):
                 raise InputError(f"experiment {name}: {column.title} is missing for some values of {column.key}")
             if not all(map(math.isnan, there)):
-                errors[column.key] = Errors(spread, column.relative)
+                errors[column.key] = StandardErrors(spread, column.relative)
     heights = scaled.get(("z", False)) if has_profile and profiles else None
     return assembled(name, heights, profiles, numbers, errors, given, trust)
 
 
-def _cell(name: str, column: _Column, text: str) -> float:
+def _cell(name: str, column: _MeasuredColumn, text: str) -> float:
     """The number in a cell; NaN for an empty one."""
     if text.strip().lower() in _WORDS_FOR_NOTHING:
         return math.nan
@@ -214,7 +222,7 @@ def _single(name: str, key: str, values: Sequence[float]) -> float:
     return found.pop()
 
 
-def _factor(column: _Column, slope: float | None, scales: Scales | None) -> float:
+def _factor(column: _MeasuredColumn, slope: float | None, scales: Scales | None) -> float:
     """What the numbers of a column are multiplied with to be dimensionless."""
     if column.relative:
         return 0.01

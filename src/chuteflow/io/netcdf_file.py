@@ -28,9 +28,9 @@ from chuteflow.io.datasets import flow_dataset
 from chuteflow.io.records import Result
 from chuteflow.steady.collocation import WHOLE
 from chuteflow.steady.quantities import Scales
-from chuteflow.steady.solver import Status
+from chuteflow.steady.solver import SolverStatus
 
-_STATUS = tuple(Status)
+_STATUS = tuple(SolverStatus)
 #: Numbers in one variable of a file at most: as many as 10^5 flows have on the finest grid.
 _LARGEST = 50_000_000
 _INTEGERS = ("unknowns", "status", "branch", "special")

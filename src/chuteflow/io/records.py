@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.branches.lines import in_order
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import KINDS, Branch, Cells, Curve, FlowSet, Searched, SpecialPoint
 from chuteflow.checks import number, shown, whole
 from chuteflow.errors import InputError
@@ -28,7 +28,7 @@ from chuteflow.steady.collocation import WHOLE, Collocation
 from chuteflow.steady.elements import DEGREES, MOST_PIECES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import Solution, Status, checked_tolerance
+from chuteflow.steady.solver import Solution, SolverStatus, checked_tolerance
 from chuteflow.theory.constitutive import Law, Unknown, fingerprint
 from chuteflow.theory.laws import law, runs_code
 
@@ -186,9 +186,9 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
     if len(kept["z"]) != degree * (len(breaks) - 1) + 3 or len(kept["macroscopic"]) != 4:
         raise InputError("a flow has the wrong number of unknowns")
     z = numbers("the unknowns of a flow", kept["z"])
-    if kept["status"] not in Status.__members__:
+    if kept["status"] not in SolverStatus.__members__:
         raise InputError(f"a flow has the unknown status {shown(kept['status'])}")
-    status = Status[kept["status"]]
+    status = SolverStatus[kept["status"]]
     logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
     error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
     if chute.law.known:
@@ -268,7 +268,9 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
         if len(found) != 1:
             raise InputError(f"it holds {len(found)} flows in the place of one")
         return found[0].flow
-    within = Range.checked(kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface)
+    within = SearchRange.checked(
+        kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface
+    )
     searched = Searched((within.coldest, within.hottest), within.deepest, _cells(kept["searched"]))
     tolerance, reason = checked_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
     incomplete = _sentence("incomplete", kept.get("incomplete"))

@@ -13,7 +13,7 @@ PAPER = (
 TITLES = {
     "flow": "one steady, fully developed flow of grains down a chute",
     "flows": "every steady, fully developed flow of grains down a chute, under one condition",
-    "curve": "the families of steady, fully developed flows of grains down a chute",
+    "curve": "the branches of steady, fully developed flows of grains down a chute",
 }
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from chuteflow.io.contract import PLACE, factor
+from chuteflow.io.contract import factor, place_object
 from chuteflow.io.stability_records import mode_object
 from chuteflow.io.tables import number
-from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, Run
+from chuteflow.stability.along import STABLE, UNKNOWN, Change, MarkedCurve, StabilityRun
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.flow import Flow
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.steady.quantities import Scales
 
 #: What the labels of stretches of a curve mean.
 LABELS = {
@@ -24,14 +23,14 @@ LABELS = {
 
 
 def samples_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dict[str, Any]]]:
-    """The judged flows of each branch: their place, whether they are stable, and the mode that grows fastest.
+    """The examined flows of each branch: their place, whether they are stable, and the mode that grows fastest.
 
     ``stable`` is null where it is not known.
     """
     return [
         [
             {
-                **_place(sample.flow, scales),
+                **place_object(sample.flow, scales),
                 "stable": None if sample.found is None else sample.found.stable,
                 "mode": None
                 if sample.found is None or sample.found.mode is None
@@ -48,7 +47,7 @@ def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
     return [
         [
             {
-                **_place(change.flow, scales),
+                **place_object(change.flow, scales),
                 "error": change.error * factor("surface_temperature", change.flow.chute, scales),
                 "neutral": change.neutral,
             }
@@ -61,16 +60,12 @@ def changes_objects(marked: MarkedCurve, scales: Scales | None) -> list[list[dic
 def change_words(change: Change, chute: Chute, scales: Scales | None) -> str:
     """Where stability changes, and how well that is known."""
     scale = factor("surface_temperature", chute, scales)
-    what = "neutral" if change.neutral else "the verdict changes"
+    what = "neutral" if change.neutral else "stability changes"
     T, error = change.flow.surface_temperature * scale, change.error * scale
     return f"{what} at T_surface = {T:.6g} +- {error:.1g}"
 
 
-def _place(flow: Flow, scales: Scales | None) -> dict[str, float]:
-    return {NUMBERS[name].symbol: getattr(flow, name) * factor(name, flow.chute, scales) for name in PLACE}
-
-
-def stretch(run: Run, chute: Chute, scales: Scales | None) -> str:
+def stretch(run: StabilityRun, chute: Chute, scales: Scales | None) -> str:
     """A stretch of a curve in words, by its surface temperatures."""
     scale = factor("surface_temperature", chute, scales)
     ends = (number(flow.surface_temperature * scale) for flow in (run.flows[0], run.flows[-1]))

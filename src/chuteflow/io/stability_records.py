@@ -9,10 +9,10 @@ import numpy as np
 
 from chuteflow.branches.results import FlowSet
 from chuteflow.io.contract import chute_object, factor, finite, flow_object, searched_object, units_object
-from chuteflow.stability.answers import Answer
-from chuteflow.stability.budget import Budget
+from chuteflow.stability.answers import StabilityAnswer
+from chuteflow.stability.budget import ModeBudget
 from chuteflow.stability.modes import Mode
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.quantities import DISTURBANCES, NUMBERS, Scales
 
@@ -23,7 +23,7 @@ COLUMNS = ("Q", "h", "M", "T_surface", "stable", "kind", "kx", "ky", "growth", "
 
 
 def answers_object(
-    flows: FlowSet, answers: Sequence[Answer], *, fields: bool = False, scales: Scales | None = None
+    flows: FlowSet, answers: Sequence[StabilityAnswer], *, fields: bool = False, scales: Scales | None = None
 ) -> dict[str, Any]:
     """What ``chuteflow stability --json`` prints; with ``fields`` the disturbed fields of each mode too, which stay
     relative to one another where ``scales`` are given."""
@@ -61,7 +61,7 @@ def mode_object(
     return numbers
 
 
-def budget_object(budget: Budget, rate: float = 1.0) -> dict[str, Any]:
+def budget_object(budget: ModeBudget, rate: float = 1.0) -> dict[str, Any]:
     """An energy budget: what each term adds to the kinetic, density and thermal energy, and in all, as growth rates,
     which are multiplied by ``rate``."""
     return {
@@ -80,7 +80,7 @@ def budget_object(budget: Budget, rate: float = 1.0) -> dict[str, Any]:
     }
 
 
-def csv_rows(answers: Sequence[Answer], scales: Scales | None = None) -> list[list[str]]:
+def csv_rows(answers: Sequence[StabilityAnswer], scales: Scales | None = None) -> list[list[str]]:
     """A head and one row for each mode, or one for a flow without; empty where there is no number."""
     rows: list[list[str]] = [list(COLUMNS)]
     for answer in answers:
@@ -95,7 +95,7 @@ def csv_rows(answers: Sequence[Answer], scales: Scales | None = None) -> list[li
     return rows
 
 
-def _answer(answer: Answer, fields: bool, scales: Scales | None) -> dict[str, Any]:
+def _answer(answer: StabilityAnswer, fields: bool, scales: Scales | None) -> dict[str, Any]:
     found, chute = answer.found, answer.flow.chute
     modes = [mode_object(mode, fields=fields, chute=chute, scales=scales) for mode in answer.modes]
     wave, rate = (factor(name, chute, scales) for name in ("wavenumber", "growth"))
@@ -122,6 +122,6 @@ def why_unknown(found: Stability) -> str | None:
     if not found.complete:
         return "one wave or one direction was examined: without --kx and --ky all are searched"
     return (
-        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids do not "
-        "tell whether something does"
+        f"nothing is known to grow, but at {len(found.unresolved)} of the wavenumbers examined the finest grids "
+        "do not resolve whether something does"
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, SCALED, Scales
 
@@ -55,7 +56,7 @@ class FlowInUnits:
         return {name: self._with_unit(name, getattr(profile, name)) for name in FIELDS}
 
     def _at(self, z: Any) -> Profile:
-        import pint
+        pint = _pint()
 
         if isinstance(z, pint.Quantity):
             try:
@@ -117,7 +118,7 @@ def _is_like(text: str, unit: str) -> bool:
     match = _AMOUNT.fullmatch(text)
     if match is None:
         return False
-    import pint
+    pint = _pint()
 
     try:
         return bool(_registry().parse_units(_with_powers(match[2])).is_compatible_with(unit))
@@ -141,7 +142,7 @@ def _converted(what: str, text: str, unit: str, plain: str) -> float:
     match = _AMOUNT.fullmatch(text)
     if match is None:
         raise InputError(f"{what} {text!r}: must be a number, {plain} or with a unit like {unit} after it")
-    import pint
+    pint = _pint()
 
     registry = _registry()
     try:
@@ -158,9 +159,11 @@ def _converted(what: str, text: str, unit: str, plain: str) -> float:
 
 
 def _registry() -> Any:
-    import pint
+    return _pint().get_application_registry()
 
-    return pint.get_application_registry()
+
+def _pint() -> Any:
+    return require("pint", "units", "a quantity with a unit")
 
 
 def _spelled(unit: str) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from chuteflow.branches.counting import Count, flux_counts
+from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
 from chuteflow.branches.results import Curve, Searched
 from chuteflow.io.contract import factor
@@ -47,7 +47,7 @@ def notes(flows: Sequence[Flow]) -> list[str]:
 
 
 def validity(flows: Sequence[Flow], chute: Chute, scales: Scales | None) -> Iterator[str]:
-    """How far the flows of a family keep to the theory, a line for each stretch of their surface temperatures."""
+    """How far the flows of a branch keep to the theory, a line for each stretch of their surface temperatures."""
     scale = factor("surface_temperature", chute, scales)
     for summary, stretch in groupby(flows, key=lambda flow: flow.validity.summary):
         ends = [flow.surface_temperature * scale for flow in stretch]
@@ -123,7 +123,7 @@ def multiplicity(curve: Curve, scales: Scales | None) -> str:
     return said
 
 
-def _fluxes(count: Count, factor: float) -> str:
+def _fluxes(count: FlowCount, factor: float) -> str:
     """The mass fluxes of a count."""
     low, high = number(count.low * factor), number(count.high * factor)
     if count.low == 0.0:

@@ -82,7 +82,8 @@ def require_suffix(path: str | os.PathLike[str], suffixes: Sequence[str]) -> str
     """
     suffix = Path(path).suffix.lower()
     if suffix not in suffixes:
-        raise InputError(f"{str(path)!r}: the name must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}")
+        allowed = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise InputError(f"{str(path)!r}: the name must end in {allowed}")
     return suffix
 
 

@@ -2,7 +2,17 @@
 
 from chuteflow.maps.domain import Domain, domain
 from chuteflow.maps.existence import exists_at
-from chuteflow.maps.outlines import KINDS_OF_BOUNDARIES, Boundary, Region
-from chuteflow.maps.plane import CODES, Axis, Plane
+from chuteflow.maps.outlines import KINDS_OF_BOUNDARIES, Outline, Region
+from chuteflow.maps.plane import CODES, ParameterAxis, ParameterPlane
 
-__all__ = ["CODES", "KINDS_OF_BOUNDARIES", "Axis", "Boundary", "Domain", "Plane", "Region", "domain", "exists_at"]
+__all__ = [
+    "CODES",
+    "KINDS_OF_BOUNDARIES",
+    "Domain",
+    "Outline",
+    "ParameterAxis",
+    "ParameterPlane",
+    "Region",
+    "domain",
+    "exists_at",
+]

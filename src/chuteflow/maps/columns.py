@@ -14,23 +14,23 @@ from dataclasses import dataclass
 
 from chuteflow.maps.plane import Code
 
-#: The class at shares of the outer and of the inner axis.
+#: The class at fractions of the outer and of the inner axis.
 Classify = Callable[[float, float], Code]
 
 
 @dataclass(frozen=True)
-class Part:
-    """One number of the class along a column: ``values`` has one entry more than ``stops``, the shares of the
+class PiecewiseConstant:
+    """One number of the class along a column: ``values`` has one entry more than ``stops``, the fractions of the
     inner axis, ascending, between them."""
 
     stops: tuple[float, ...]
     values: tuple[int, ...]
 
-    def at(self, share: float) -> int:
-        """The number at a share of the inner axis."""
-        return self.values[bisect_right(self.stops, share)]
+    def at(self, fraction: float) -> int:
+        """The number at a fraction of the inner axis."""
+        return self.values[bisect_right(self.stops, fraction)]
 
-    def without_bands(self, width: float) -> Part:
+    def without_bands(self, width: float) -> PiecewiseConstant:
         """The part with no band narrower than ``width`` between two stops: these meet half-way."""
         stops, values = list(self.stops), list(self.values)
         while len(stops) > 1:
@@ -41,14 +41,16 @@ class Part:
             del values[narrow + 1]
             if values[narrow] == values[narrow + 1]:
                 del stops[narrow], values[narrow]
-        return Part(tuple(stops), tuple(values))
+        return PiecewiseConstant(tuple(stops), tuple(values))
 
 
 #: Widths, in tolerances, below which a band may be left out: a point in it is within the tolerance of its edges.
 _BANDS = (0.0, 1.0, 2.0)
 
 
-def alike(left: Part, right: Part, tolerance: float) -> tuple[Part, Part] | None:
+def alike(
+    left: PiecewiseConstant, right: PiecewiseConstant, tolerance: float
+) -> tuple[PiecewiseConstant, PiecewiseConstant] | None:
     """Both parts as they are if they have the same values, or without bands that are too narrow to be resolved;
     None where their values differ still."""
     if left.values == right.values:
@@ -64,23 +66,23 @@ def alike(left: Part, right: Part, tolerance: float) -> tuple[Part, Part] | None
 
 @dataclass(frozen=True)
 class Column:
-    """Classes along the inner axis at the share ``place`` of the outer one, number by number."""
+    """Classes along the inner axis at the fraction ``place`` of the outer one, number by number."""
 
     place: float
-    parts: tuple[Part, ...]
+    parts: tuple[PiecewiseConstant, ...]
 
 
-def column(place: float, classify: Classify, shares: Iterable[float], tolerance: float) -> Column:
-    """The column at ``place``: classified at ``shares`` and at both ends, and halved where the class changes."""
-    stops, codes = halved(place, classify, shares, tolerance)
-    return Column(place, tuple(part(stops, values) for values in zip(*codes, strict=True)))
+def classify_column(place: float, classify: Classify, fractions: Iterable[float], tolerance: float) -> Column:
+    """The column at ``place``: classified at ``fractions`` and at both ends, and halved where the class changes."""
+    stops, codes = halve(place, classify, fractions, tolerance)
+    return Column(place, tuple(find_part(stops, values) for values in zip(*codes, strict=True)))
 
 
-def halved(
-    place: float, classify: Classify, shares: Iterable[float], tolerance: float
+def halve(
+    place: float, classify: Classify, fractions: Iterable[float], tolerance: float
 ) -> tuple[list[float], list[Code]]:
     """The stops of a column at ``place``, ascending, and the classes between them, one more."""
-    points = sorted({0.0, 1.0, *(s for s in shares if 0.0 < s < 1.0)})
+    points = sorted({0.0, 1.0, *(s for s in fractions if 0.0 < s < 1.0)})
     known = [(s, classify(place, s)) for s in points]
     stops: list[float] = []
     codes = [known[0][1]]
@@ -102,29 +104,29 @@ def halved(
     return stops, codes
 
 
-def part(stops: Sequence[float], values: Sequence[int]) -> Part:
+def find_part(stops: Sequence[float], values: Sequence[int]) -> PiecewiseConstant:
     """The part of ``values`` between ``stops``, without stops at which nothing changes."""
     changes = [i for i in range(len(stops)) if values[i] != values[i + 1]]
-    return Part(tuple(stops[i] for i in changes), (values[0], *(values[i + 1] for i in changes)))
+    return PiecewiseConstant(tuple(stops[i] for i in changes), (values[0], *(values[i + 1] for i in changes)))
 
 
-def shares_for(place: float, nearby: Sequence[Column], guards: int, tolerance: float) -> list[float]:
+def choose_fractions(place: float, nearby: Sequence[Column], guards: int, tolerance: float) -> list[float]:
     """Where to classify a new column: evenly at ``guards`` shares, and around the stops that those ``nearby`` (up
     to two to either side, ascending) lead to expect."""
-    shares = [(i + 0.5) / guards for i in range(guards)]
+    fractions = [(i + 0.5) / guards for i in range(guards)]
     places = [one.place for one in nearby]
     each = zip(*(one.parts for one in nearby), strict=True)
     last = -1.0
     for stop in sorted(stop for parts in each for stop in _expected(place, places, parts)):
         # Numbers that change together are expected to do so at nearly the same stop.
         if stop - last > 0.5 * tolerance:
-            # A little more than the tolerance apart would be halved once more.
-            shares += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
+            # A little more than the tolerance apart would be halved again.
+            fractions += [stop - 0.49 * tolerance, stop + 0.49 * tolerance]
             last = stop
-    return shares
+    return fractions
 
 
-def _expected(place: float, places: Sequence[float], parts: Sequence[Part]) -> list[float]:
+def _expected(place: float, places: Sequence[float], parts: Sequence[PiecewiseConstant]) -> list[float]:
     """Stops at ``place`` by interpolation between those of columns at ``places`` that have the same values."""
     right = bisect_right(places, place)
     beside = parts[right - 1 : right + 1]
@@ -138,17 +140,19 @@ def _expected(place: float, places: Sequence[float], parts: Sequence[Part]) -> l
     ]
 
 
-def between(left: Column, right: Column, number: int, place: float, tolerance: float) -> Part:
+def interpolate_column(left: Column, right: Column, number: int, place: float, tolerance: float) -> PiecewiseConstant:
     """The part ``number`` at a place between two columns: on lines, or else as in the nearer one."""
-    share = (place - left.place) / (right.place - left.place)
+    fraction = (place - left.place) / (right.place - left.place)
     pair = alike(left.parts[number], right.parts[number], tolerance)
     if pair is None:
-        return (left if share < 0.5 else right).parts[number]
+        return (left if fraction < 0.5 else right).parts[number]
     one, two = pair
-    return Part(tuple(a + share * (b - a) for a, b in zip(one.stops, two.stops, strict=True)), one.values)
+    return PiecewiseConstant(
+        tuple(a + fraction * (b - a) for a, b in zip(one.stops, two.stops, strict=True)), one.values
+    )
 
 
-def to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> list[tuple[int, float]]:
+def find_intervals_to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> list[tuple[int, float]]:
     """The intervals (index of the left column, place of the middle) whose inside the columns do not tell.
 
     Those are where for one of the numbers the row of values changes, or a stop, by the bend that the columns around
@@ -167,7 +171,7 @@ def to_halve(columns: Sequence[Column], tolerance: float, narrowest: float) -> l
     return wanted
 
 
-def _unsure(parts: Sequence[Part], places: Sequence[float], left: int, tolerance: float) -> bool:
+def _unsure(parts: Sequence[PiecewiseConstant], places: Sequence[float], left: int, tolerance: float) -> bool:
     """Whether stops between columns ``left`` and the next are not on lines, to the tolerance, as far as is known."""
     pair = alike(parts[left], parts[left + 1], tolerance)
     if pair is None:
@@ -186,7 +190,7 @@ def _unsure(parts: Sequence[Part], places: Sequence[float], left: int, tolerance
     return not bends or max(bends) * width**2 / 8.0 > tolerance
 
 
-def _bend(parts: Sequence[Part], places: Sequence[float]) -> float:
+def _bend(parts: Sequence[PiecewiseConstant], places: Sequence[float]) -> float:
     """Largest second derivative of the stops through three columns."""
     one, two = places[1] - places[0], places[2] - places[1]
     return max(

@@ -17,21 +17,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Searched
 from chuteflow.checks import checked_size, number
 from chuteflow.errors import InputError
-from chuteflow.maps.columns import Classify, Column, between, column, shares_for, to_halve
+from chuteflow.maps.columns import (
+    Classify,
+    Column,
+    choose_fractions,
+    classify_column,
+    find_intervals_to_halve,
+    interpolate_column,
+)
 from chuteflow.maps.kinds import DENSITIES, INTERIORS
-from chuteflow.maps.outlines import Boundary, Region, boundaries, regions
-from chuteflow.maps.plane import CODES, HOT_CODES, Axis, Plane, code, hot_code
+from chuteflow.maps.outlines import Outline, Region, make_regions, trace_outlines
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, classify, classify_hot
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
 
-#: Shares of an axis to which boundaries are located, unless another is asked for; the finest and coarsest allowed.
+#: Fractions of an axis to which boundaries are located, by default; the finest and coarsest allowed.
 TOLERANCE, FINEST, COARSEST = 2e-3, 1e-6, 0.1
 #: Columns to begin with; at the coarsest tolerance allowed; and in closed form.
 _FIRST_COLUMNS, _FEWEST_COLUMNS, _HOT_COLUMNS = 33, 17, 129
@@ -48,12 +55,12 @@ class Domain(Result):
     """Classes over ``plane``, on a grid of cells and by their outlines.
 
     ``x`` (m,) and ``y`` (n,) are the centres of the cells. All else on the grid is (n, m), row by row from the
-    lowest y. ``tolerance`` is the share of either axis to which boundaries are known. ``columns`` are those from
+    lowest y. ``tolerance`` is the fraction of either axis to which boundaries are known. ``columns`` are those from
     which grid and outlines are read, and ``hot_columns`` those of the closed form of section 4, none with the
     interface conditions, which that leaves out.
     """
 
-    plane: Plane
+    plane: ParameterPlane
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     tolerance: float
@@ -72,12 +79,12 @@ class Domain(Result):
             for values in (getattr(self, name),)
             for value in np.unique(values)
         ]
-        return display.html_table(repr(self)[1:-1], ["class", "value", "share of the cells"], rows)
+        return display.html_table(repr(self)[1:-1], ["class", "value", "fraction of the cells"], rows)
 
     @classmethod
     def on_cells(
         cls,
-        plane: Plane,
+        plane: ParameterPlane,
         size: tuple[int, int],
         tolerance: float,
         columns: tuple[Column, ...],
@@ -106,12 +113,12 @@ class Domain(Result):
 
     @cached_property
     def families(self) -> NDArray[np.int16]:
-        """The number of families: connected sets of flows in the range searched."""
+        """The number of branches: connected sets of flows in the range searched."""
         return self._named("families")
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
-        """Whether there are hidden families: more than one, so that no continuation from one flow meets all."""
+        """Whether there are hidden branches: more than one, so that no continuation from one flow meets all."""
         return self._named("families") > 1
 
     @cached_property
@@ -126,25 +133,25 @@ class Domain(Result):
 
     @cached_property
     def exists_at(self) -> NDArray[np.bool_]:
-        """Whether there is a flow at each temperature asked for, (T, n, m)."""
+        """Whether there is a flow at each requested temperature, (T, n, m)."""
         first = len(CODES)
         layers = [self._on_grid(self.columns, first + i) > 0 for i in range(len(self.plane.temperatures))]
         return np.array(layers, dtype=bool).reshape(len(layers), len(self.y), len(self.x))
 
     @cached_property
-    def boundaries(self) -> tuple[Boundary, ...]:
+    def boundaries(self) -> tuple[Outline, ...]:
         """All boundaries between classes, as lines in the plane of the parameters."""
-        return boundaries(self.plane, self.columns, self.hot_columns, self.tolerance)
+        return trace_outlines(self.plane, self.columns, self.hot_columns, self.tolerance)
 
     def regions(self, *names: str) -> tuple[Region, ...]:
         """The plane cut up by the value of a number of the class, a name of CODES; of several names, by the sum of
         the first, twice the second and so on."""
         bits = {CODES.index(name): 2**i for i, name in enumerate(names)}
-        return regions(self.plane, self.columns, bits, self.tolerance)
+        return make_regions(self.plane, self.columns, bits, self.tolerance)
 
     @property
     def searched(self) -> Searched:
-        """The range in which flows were looked for."""
+        """The range in which flows were searched for."""
         within = self.plane.within
         return Searched((within.coldest, within.hottest), within.deepest)
 
@@ -168,8 +175,8 @@ class Domain(Result):
 @np.errstate(under="ignore")
 def domain(
     chute: Chute,
-    x: Axis | tuple[str, float, float],
-    y: Axis | tuple[str, float, float],
+    x: ParameterAxis | tuple[str, float, float],
+    y: ParameterAxis | tuple[str, float, float],
     *,
     size: tuple[int, int] = (400, 400),
     temperatures: Sequence[float] = (),
@@ -186,8 +193,8 @@ def domain(
         x, y: the axes, any two of the four parameters: their name in :class:`chuteflow.Chute`, lowest and highest
             value, such as ``("slope", 0.1, 0.5)``.
         size: cells along x and y.
-        temperatures: surface temperatures at which flows are looked for too.
-        tolerance: share of an axis to which boundaries are located, from 1e-6 to 0.1.
+        temperatures: surface temperatures at which flows are searched for too.
+        tolerance: fraction of an axis to which boundaries are located, from 1e-6 to 0.1.
         surface_temperature: range searched.
         largest_holdup: range searched.
         workers: processes. With 1 all is done in this one; with more, a script needs the usual
@@ -201,16 +208,18 @@ def domain(
     size = checked_size(size, 1, LARGEST_SIZE)
     tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
-        raise InputError(f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a share of an axis")
-    within = Range.checked(surface_temperature, largest_holdup, chute.surface)
+        raise InputError(
+            f"tolerance = {tolerance:g}: must be from {FINEST:g} to {COARSEST:g}, as a fraction of an axis"
+        )
+    within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     temperatures = tuple(number("temperature", t) for t in temperatures)
     for t in temperatures:
         if not within.coldest <= t <= within.hottest:
             raise InputError(
                 f"temperature {t:g}: must be in the range searched, {within.coldest:g} to {within.hottest:g}"
             )
-    x, y = (axis if isinstance(axis, Axis) else Axis(*axis) for axis in (x, y))
-    plane = Plane(x, y, chute, temperatures, within)
+    x, y = (axis if isinstance(axis, ParameterAxis) else ParameterAxis(*axis) for axis in (x, y))
+    plane = ParameterPlane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
         columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
     hot_columns = _hot_columns(plane, tolerance) if chute.surface == "free" else ()
@@ -224,11 +233,11 @@ def _pool(workers: int) -> AbstractContextManager[Executor | None]:
     return worker_pool(workers) if workers > 1 else nullcontext()
 
 
-def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
+def _columns(plane: ParameterPlane, tolerance: float, pool: Executor | None, progress: Progress) -> list[Column]:
     """Columns as many as it takes, in order along the outer axis."""
     first = _FIRST_COLUMNS if tolerance < 5.0 * TOLERANCE else _FEWEST_COLUMNS
     tasks = [
-        _Task(plane, place, shares_for(place, (), _GUARDS, tolerance), tolerance)
+        _Task(plane, place, choose_fractions(place, (), _GUARDS, tolerance), tolerance)
         for place in np.linspace(0.0, 1.0, first).tolist()
     ]
     columns: list[Column] = []
@@ -238,12 +247,17 @@ def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Pr
             columns.append(found)
             progress(len(columns), known)
         columns.sort(key=lambda one: one.place)
-        wanted = to_halve(columns, tolerance, tolerance)
+        wanted = find_intervals_to_halve(columns, tolerance, tolerance)
         if len(columns) == first:
-            # All that is narrower than the first columns are apart is looked for once more.
+            # All that is narrower than the first columns are apart is searched for again.
             wanted = [(i, 0.5 * (left.place + right.place)) for i, (left, right) in enumerate(pairwise(columns))]
         tasks = [
-            _Task(plane, place, shares_for(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, tolerance), tolerance)
+            _Task(
+                plane,
+                place,
+                choose_fractions(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, tolerance),
+                tolerance,
+            )
             for i, place in wanted
         ]
     return columns
@@ -253,25 +267,27 @@ def _columns(plane: Plane, tolerance: float, pool: Executor | None, progress: Pr
 class _Task:
     """A column to work out."""
 
-    plane: Plane
+    plane: ParameterPlane
     place: float
     shares: Sequence[float]
     tolerance: float
 
 
 def _column(task: _Task) -> Column:
-    return column(task.place, partial(code, task.plane), task.shares, task.tolerance)
+    return classify_column(task.place, partial(classify, task.plane), task.shares, task.tolerance)
 
 
-def _hot_columns(plane: Plane, tolerance: float) -> list[Column]:
+def _hot_columns(plane: ParameterPlane, tolerance: float) -> list[Column]:
     """Columns of what is known in closed form, finer than the others."""
     fine = 0.1 * tolerance
-    classify: Classify = partial(hot_code, plane)
+    classify: Classify = partial(classify_hot, plane)
     places = np.linspace(0.0, 1.0, _HOT_COLUMNS).tolist()
-    columns = [column(place, classify, shares_for(place, (), _GUARDS, fine), fine) for place in places]
-    while wanted := to_halve(columns, fine, fine):
+    columns = [classify_column(place, classify, choose_fractions(place, (), _GUARDS, fine), fine) for place in places]
+    while wanted := find_intervals_to_halve(columns, fine, fine):
         columns += [
-            column(place, classify, shares_for(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, fine), fine)
+            classify_column(
+                place, classify, choose_fractions(place, columns[max(i - 1, 0) : i + 3], _LATER_GUARDS, fine), fine
+            )
             for i, place in wanted
         ]
         columns.sort(key=lambda one: one.place)
@@ -285,11 +301,11 @@ def _gridded(
     outer: NDArray[np.float64],
     inner: NDArray[np.float64],
 ) -> NDArray[np.int16]:
-    """One number of the class at shares of the outer and inner axis, (outer, inner)."""
+    """One number of the class at fractions of the outer and inner axis, (outer, inner)."""
     places = np.array([one.place for one in columns])
     grid = np.empty((len(outer), len(inner)), dtype=np.int16)
     for i, place in enumerate(outer.tolist()):
         right = int(np.clip(np.searchsorted(places, place), 1, len(columns) - 1))
-        part = between(columns[right - 1], columns[right], number, place, tolerance)
+        part = interpolate_column(columns[right - 1], columns[right], number, place, tolerance)
         grid[i] = np.array(part.values, dtype=np.int16)[np.searchsorted(part.stops, inner, side="right")]
     return grid

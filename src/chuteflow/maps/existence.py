@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -21,7 +21,7 @@ from chuteflow.parameters import LARGEST_HOLDUP
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.model import model
 from chuteflow.trajectories.kernel import S_T
-from chuteflow.trajectories.refining import REFINEMENT, TrajectoryGrid, carry_down_for
+from chuteflow.trajectories.refining import REFINEMENT, TrajectoryGrid, integrate_trajectories_from
 from chuteflow.trajectories.tables import envelope
 
 #: Trajectories of the surface temperatures alone, without others between.
@@ -42,13 +42,13 @@ def exists_at(
     temperature = np.atleast_1d(real_array("surface_temperature", surface_temperature))
     if temperature.ndim != 1 or not temperature.size:
         raise InputError("surface temperatures must be one number or a list of them")
-    Range.checked((float(temperature.min()), 2.0 * float(temperature.max())), largest_holdup)
+    SearchRange.checked((float(temperature.min()), 2.0 * float(temperature.max())), largest_holdup)
     found = np.zeros((len(chutes), len(temperature)), dtype=bool)
     # A single trajectory has no neighbours, and is carried along with another.
     starts = np.unique(temperature) if len(np.unique(temperature)) > 1 else np.array([1.0, 2.0]) * temperature[0]
     for members in _sharing_trajectories(chutes):
         models = [model(chutes[i]) for i in members]
-        grid = carry_down_for(models[0], envelope(models), starts, largest_holdup, _ALONE)
+        grid = integrate_trajectories_from(models[0], envelope(models), starts, largest_holdup, _ALONE)
         for i, problem in zip(members, models, strict=True):
             found[i] = _is_met(grid.of_base(problem), temperature)
     return found
@@ -57,7 +57,7 @@ def exists_at(
 def _is_met(grid: TrajectoryGrid, temperature: Array) -> NDArray[np.bool_]:
     """Whether the trajectory of each surface temperature (C,) meets the base anywhere."""
     ends = grid.zeros[:, :2].astype(np.int64)
-    along = np.not_equal(*grid.rows_of(ends).T)
+    along = np.not_equal(*grid.steps_of(ends).T)
     return np.isin(np.log(temperature), grid.states[ends[along, 1], S_T])
 
 

@@ -1,4 +1,4 @@
-"""What flows a base has on a grid of trajectories: how many, of which kinds, and in how many families."""
+"""What flows a base has on a grid of trajectories: how many, of which kinds, and in how many branches."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.counting import most_at_once
-from chuteflow.branches.rough_turns import dips
-from chuteflow.maps.zeros import Index, Zeros, lagrange, zeros_on
+from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros, lagrange
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import TrajectoryGrid
@@ -18,21 +18,21 @@ from chuteflow.trajectories.refining import TrajectoryGrid
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
-#: Turns of ln Q along a family are told apart if they differ by more.
+#: Turns of ln Q along a branch are distinguished if they differ by more.
 _TURN = 1e-6
-#: A net loss below this share of the largest is none, and more of it for hold-ups that are not small against the
+#: A net loss below this fraction of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
 _BALANCE, _DEEP, _RISE = 2e-3, 5.0, 1.5e-3
 
 
 @dataclass(frozen=True)
-class Kinds:
+class FlowClasses:
     """The flows of one chute in the range searched.
 
-    ``at`` tells whether there is one at each temperature asked for; ``most`` is the largest number at one flux, and
-    ``doubtful`` tells whether it would be larger with turns of the flux that are smaller than its uncertainty;
-    ``families`` is the number of families (connected sets of flows); ``interior`` and ``density`` have the bits of
+    ``at`` is whether there is one at each requested temperature; ``most`` is the largest number at one flux, and
+    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty;
+    ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
     INTERIORS and DENSITIES that are present.
     """
 
@@ -44,13 +44,13 @@ class Kinds:
     doubtful: bool
 
 
-def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> Kinds:
+def classify_flows(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
     """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
-    of :func:`chuteflow.maps.zeros.extremes_on`."""
+    of :func:`chuteflow.maps.zeros.bound_extremes`."""
     lines = [line for line, _ in grid.lines if len(line) > 1]
     if not lines:
-        return Kinds((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
-    zeros = zeros_on(grid, extremes)
+        return FlowClasses((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
+    zeros = evaluate_zeros(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
     pieces, interior, density = [], 0, 0
     for line in lines:
@@ -63,7 +63,7 @@ def kinds(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) 
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
     most, least = (most_at_once(np.concatenate(stretches), _TURN) for stretches in zip(*pieces, strict=True))
     there = tuple(map(bool, at.tolist()))
-    return Kinds(there, least, len(lines), interior, density, doubtful=most != least)
+    return FlowClasses(there, least, len(lines), interior, density, doubtful=most != least)
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:
@@ -102,7 +102,7 @@ def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
 
 
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> tuple[Array, Array]:
-    """Lowest and highest ln Q (pieces, 2) of the stretches of a family between turns of Q, where ``rise`` changes
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, where ``rise`` changes
     sign: of all turns, and of those alone that are larger than ln Q is uncertain."""
     length = np.hypot(np.diff(log_t), np.diff(log_m))
     keep = np.append(True, length > 1e-9)
@@ -143,20 +143,22 @@ def _scatter(log_q: Array, at: Array) -> Array:
 
 
 def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
-    """The steps in which ``rise`` changes sign, and the shares of them at which it does so; a step in which it passes
-    zero twice, as just beyond a cusp, is there twice."""
+    """The steps in which ``rise`` changes sign, and the fractions of them at which it does so; a step in which it
+    passes zero twice, as just beyond a cusp, is there twice."""
     changes = np.flatnonzero((rise[1:] > 0.0) != (rise[:-1] > 0.0))
-    pairs = [(dip.step, zero) for dip in dips(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros]
+    pairs = [
+        (dip.step, zero) for dip in find_extrema(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros
+    ]
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
-    shares = np.concatenate(
+    fractions = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]
     )
-    order = np.lexsort((shares, steps))
-    return steps[order], shares[order]
+    order = np.lexsort((fractions, steps))
+    return steps[order], fractions[order]
 
 
 def _confirmed(stops: list[float], rises: float, noise: list[float]) -> list[float]:
-    """Values at the ends and turns of a family without those turns between which it does not turn by more than the
+    """Values at the ends and turns of a branch without those turns between which it does not turn by more than the
     ``noise`` of either.
 
     It ``rises`` first (1), or falls (-1), and so on in turn.

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
-from chuteflow.maps.columns import Column, Part, alike, part
-from chuteflow.maps.plane import CODES, HOT_CODES, Plane
+from chuteflow.maps.columns import Column, PiecewiseConstant, alike, find_part
+from chuteflow.maps.plane import CODES, HOT_CODES, ParameterPlane
 from chuteflow.result import Compared
 
-#: A point: shares of the outer and of the inner axis.
+#: A point: fractions of the outer and of the inner axis.
 Point = tuple[float, float]
 #: The values to either side of a line, the lesser first.
 Label = tuple[int, int]
@@ -27,7 +27,7 @@ _Stretch = tuple[Point, Point]
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary(Compared):
+class Outline(Compared):
     """A line between two classes.
 
     ``kind`` is one of KINDS_OF_BOUNDARIES; ``values`` are those of the number that changes, the lesser first, or
@@ -42,7 +42,7 @@ class Boundary(Compared):
 
     def __repr__(self) -> str:
         between = f"between {self.values[0]} and {self.values[1]}"
-        return display.line("Boundary", self.kind, between, display.counted(len(self.points), "point"))
+        return display.line("Outline", self.kind, between, display.counted(len(self.points), "point"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ KINDS_OF_BOUNDARIES = {
     "lambda=3": "hot flows end: their base gives more energy than they can lose (closed form)",
     "lambda=0.660": "hot flows turn densest above the base (closed form)",
     "existence": "the first or last flow",
-    "families": "another family of flows",
+    "families": "another branch of flows",
     "multiplicity": "the largest number of flows that share one mass flux",
     "dissipative": "the first or last flow with a dissipative interior",
     "mixed": "the first or last flow with a mixed interior",
@@ -76,9 +76,9 @@ KINDS_OF_BOUNDARIES = {
 _BOUNDS = {"base": "F21=0", "inside": "delta=0", "steep": "lambda=3", "inversion": "lambda=0.660"}
 
 
-def boundaries(
-    plane: Plane, columns: Sequence[Column], hot_columns: Sequence[Column], tolerance: float
-) -> tuple[Boundary, ...]:
+def trace_outlines(
+    plane: ParameterPlane, columns: Sequence[Column], hot_columns: Sequence[Column], tolerance: float
+) -> tuple[Outline, ...]:
     """Every boundary of the map, kind by kind."""
     found = list(_hot_boundaries(plane, hot_columns, 0.1 * tolerance)) if hot_columns else []
     for number, name in enumerate(CODES):
@@ -87,19 +87,21 @@ def boundaries(
             one = "existence" if kind == "families" and values[0] == 0 else kind
             # Where flows begin, all their classes do: the boundary of existence says it once.
             if name == "families" or (kind == "multiplicity" and values[0] > 0):
-                found.append(Boundary(one, values, _in_plane(plane, points)))
+                found.append(Outline(one, values, _in_plane(plane, points)))
             elif name not in ("most", "families"):
                 found += [
-                    Boundary(kind, values, _in_plane(plane, piece))
+                    Outline(kind, values, _in_plane(plane, piece))
                     for piece in _where(points, lambda p: _exists_around(columns, p))
                 ]
     for i, temperature in enumerate(plane.temperatures):
         for values, points in _lines(_parts(columns, len(CODES) + i), tolerance):
-            found.append(Boundary("temperature", values, _in_plane(plane, points), temperature))
+            found.append(Outline("temperature", values, _in_plane(plane, points), temperature))
     return tuple(found)
 
 
-def regions(plane: Plane, columns: Sequence[Column], bits: dict[int, int], tolerance: float) -> tuple[Region, ...]:
+def make_regions(
+    plane: ParameterPlane, columns: Sequence[Column], bits: dict[int, int], tolerance: float
+) -> tuple[Region, ...]:
     """Polygons that fill the plane, one between two stops of neighbouring columns.
 
     ``bits`` has factors of numbers of the class; the value of a region is the sum of their products.
@@ -123,15 +125,15 @@ def regions(plane: Plane, columns: Sequence[Column], bits: dict[int, int], toler
     return tuple(found)
 
 
-def _summed(parts: Sequence[Part], factors: Sequence[int]) -> Part:
+def _summed(parts: Sequence[PiecewiseConstant], factors: Sequence[int]) -> PiecewiseConstant:
     """The part whose values are sums of those of ``parts``, each times its factor."""
     stops = sorted({stop for one in parts for stop in one.stops})
     inside = [0.5 * (a + b) for a, b in pairwise([-1.0, *stops, 2.0])]
-    values = [sum(f * one.at(share) for f, one in zip(factors, parts, strict=True)) for share in inside]
-    return part(stops, values)
+    values = [sum(f * one.at(fraction) for f, one in zip(factors, parts, strict=True)) for fraction in inside]
+    return find_part(stops, values)
 
 
-def _hot_boundaries(plane: Plane, columns: Sequence[Column], tolerance: float) -> Iterator[Boundary]:
+def _hot_boundaries(plane: ParameterPlane, columns: Sequence[Column], tolerance: float) -> Iterator[Outline]:
     """The bounds in closed form, as far as they are bounds of hot flows, and the onset of inversion among them."""
     places, hot = _parts(columns, HOT_CODES.index("hot"))
 
@@ -145,18 +147,18 @@ def _hot_boundaries(plane: Plane, columns: Sequence[Column], tolerance: float) -
         wanted = among if name == "inversion" else bounds
         for values, points in _lines(_parts(columns, HOT_CODES.index(name)), tolerance):
             for piece in _where(points, wanted):
-                yield Boundary(kind, values, _in_plane(plane, piece))
+                yield Outline(kind, values, _in_plane(plane, piece))
 
 
-def _parts(columns: Sequence[Column], number: int) -> tuple[list[float], list[Part]]:
+def _parts(columns: Sequence[Column], number: int) -> tuple[list[float], list[PiecewiseConstant]]:
     return [one.place for one in columns], [one.parts[number] for one in columns]
 
 
-#: How far around a point classes are looked at: beyond the tolerance of the columns there.
+#: How far around a point classes are examined: beyond the tolerance of the columns there.
 _ASIDE = 2e-3
 
 
-def _around(places: Sequence[float], parts: Sequence[Part], point: Point) -> set[int]:
+def _around(places: Sequence[float], parts: Sequence[PiecewiseConstant], point: Point) -> set[int]:
     """Values close to a point."""
     found = set()
     for outer in (-_ASIDE, 0.0, _ASIDE):
@@ -167,8 +169,8 @@ def _around(places: Sequence[float], parts: Sequence[Part], point: Point) -> set
 
 def _exists_around(columns: Sequence[Column], point: Point) -> bool:
     """Whether there are flows on all sides of a point."""
-    places, families = _parts(columns, CODES.index("families"))
-    return 0 not in _around(places, families, point)
+    places, branches = _parts(columns, CODES.index("families"))
+    return 0 not in _around(places, branches, point)
 
 
 def _where(points: Sequence[Point], wanted: Callable[[Point], bool]) -> Iterator[list[Point]]:
@@ -185,13 +187,15 @@ def _where(points: Sequence[Point], wanted: Callable[[Point], bool]) -> Iterator
         yield piece
 
 
-def _in_plane(plane: Plane, points: Sequence[Point]) -> NDArray[np.float64]:
+def _in_plane(plane: ParameterPlane, points: Sequence[Point]) -> NDArray[np.float64]:
     outer, inner = np.array(points, dtype=float).T
     values = plane.outer.at(outer), plane.inner.at(inner)
     return np.stack(values[::-1] if plane.transposed else values, axis=-1)
 
 
-def _lines(along: tuple[Sequence[float], Sequence[Part]], tolerance: float) -> Iterator[tuple[Label, list[Point]]]:
+def _lines(
+    along: tuple[Sequence[float], Sequence[PiecewiseConstant]], tolerance: float
+) -> Iterator[tuple[Label, list[Point]]]:
     """The outlines of a number of the class: the values to either side, and the points of a line."""
     stretches: dict[Label, list[_Stretch]] = {}
     for (place, left), (after, right) in pairwise(zip(*along, strict=True)):

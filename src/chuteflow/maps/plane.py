@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from chuteflow.branches.counting import most_solved
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.maps.kinds import DENSITIES, INTERIORS, Kinds, kinds
-from chuteflow.maps.zeros import extremes_on
+from chuteflow.maps.kinds import DENSITIES, INTERIORS, FlowClasses, classify_flows
+from chuteflow.maps.zeros import bound_extremes
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
@@ -25,14 +25,14 @@ from chuteflow.steady.model import model
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Law, require_limit
 from chuteflow.theory.hot import LAMBDA_C, Dilute, dilute, hot_parameters, inversion_lambda
-from chuteflow.trajectories.refining import TrajectoryGrid, carry_down_for, starts
+from chuteflow.trajectories.refining import TrajectoryGrid, integrate_trajectories_from, starting_temperatures
 from chuteflow.trajectories.tables import ENTRIES, envelope
 
 #: What the flows of a point are classified by, in the order of its code; after these come the temperatures asked
 #: for. All but the first two are 1 where there are such flows, else 0.
 CODES = ("most", "families", *INTERIORS, *DENSITIES)
 #: The same in few numbers: whether there are hot flows (1, 0, or -1 where the theory does not say), the numbers of
-#: flows that share one flux and of families, and the bits of the kinds of interior and of density.
+#: flows that share one flux and of branches, and the bits of the kinds of interior and of density.
 SUMMARY = ("hot", "most", "families", "interior", "density")
 #: What is known of hot flows in closed form, in the order of its code: whether there are any, and on which side of
 #: each bound a point is.
@@ -49,7 +49,7 @@ Code = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Axis:
+class ParameterAxis:
     """A parameter from ``low`` to ``high``.
 
     Raises:
@@ -69,27 +69,27 @@ class Axis:
         if not self.low < self.high:
             raise InputError(f"{self.name} from {self.low:g} to {self.high:g}: must rise")
 
-    def at(self, share: Any) -> Any:
-        """The value (or values) at a share of the range, 0 to 1."""
-        return self.low + (self.high - self.low) * share
+    def at(self, fraction: Any) -> Any:
+        """The value (or values) at a fraction of the range, 0 to 1."""
+        return self.low + (self.high - self.low) * fraction
 
 
 @dataclass(frozen=True)
-class Plane:
+class ParameterPlane:
     """Two axes, and the values of all else.
 
     ``chute`` has the fixed parameters, those of the axes at a value that does not matter; ``temperatures`` are
-    those at which flows are looked for; ``within`` is the range searched.
+    those at which flows are searched for; ``within`` is the range searched.
 
     Raises:
         InputError: for twice the same axis, or for a corner that is no chute.
     """
 
-    x: Axis
-    y: Axis
+    x: ParameterAxis
+    y: ParameterAxis
     chute: Chute
     temperatures: tuple[float, ...]
-    within: Range = field(default_factory=lambda: Range.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
+    within: SearchRange = field(default_factory=lambda: SearchRange.checked(SURFACE_TEMPERATURE, LARGEST_HOLDUP))
 
     def __post_init__(self) -> None:
         if self.x.name == self.y.name:
@@ -111,23 +111,23 @@ class Plane:
         return PARAMETERS[self.x.name].of_base and not PARAMETERS[self.y.name].of_base
 
     @property
-    def outer(self) -> Axis:
+    def outer(self) -> ParameterAxis:
         """The axis along which columns are placed."""
         return self.y if self.transposed else self.x
 
     @property
-    def inner(self) -> Axis:
+    def inner(self) -> ParameterAxis:
         """The axis along a column."""
         return self.x if self.transposed else self.y
 
     def chute_at(self, outer: float, inner: float) -> Chute:
-        """The chute at shares 0 to 1 of the outer and inner axis."""
+        """The chute at fractions 0 to 1 of the outer and inner axis."""
         u, v = float(self.outer.at(outer)), float(self.inner.at(inner))
         return self.at(v, u) if self.transposed else self.at(u, v)
 
 
-def code(plane: Plane, outer: float, inner: float) -> Code:
-    """The class of the point at shares of the outer and inner axis of ``plane``, by CODES."""
+def classify(plane: ParameterPlane, outer: float, inner: float) -> Code:
+    """The class of the point at fractions of the outer and inner axis of ``plane``, by CODES."""
     found = _kinds(plane, plane.chute_at(outer, inner))
     return (
         found.most,
@@ -138,25 +138,25 @@ def code(plane: Plane, outer: float, inner: float) -> Code:
     )
 
 
-def summary(plane: Plane, outer: float, inner: float) -> Code:
-    """The class of the point at shares of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
+def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
+    """The class of the point at fractions of the outer and inner axis of ``plane`` in few numbers, by SUMMARY."""
     found = _kinds(plane, plane.chute_at(outer, inner))
-    hot = hot_code(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
+    hot = classify_hot(plane, outer, inner)[0] if plane.chute.surface == "free" else -1
     return (hot, found.most, found.families, found.interior, found.density)
 
 
-def _kinds(plane: Plane, chute: Chute) -> Kinds:
+def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
     grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
     problem = model(chute)
-    found = kinds(grid.of_base(problem), extremes, plane.temperatures)
+    found = classify_flows(grid.of_base(problem), extremes, plane.temperatures)
     if not found.doubtful:
         return found
     most = most_solved(problem, plane.within, _TOLERANCE)
     return found if most is None else replace(found, most=most, doubtful=False)
 
 
-def hot_code(plane: Plane, outer: float, inner: float) -> Code:
-    """What is known in closed form of the point at shares of the outer and inner axis, by HOT_CODES.
+def classify_hot(plane: ParameterPlane, outer: float, inner: float) -> Code:
+    """What is known in closed form of the point at fractions of the outer and inner axis, by HOT_CODES.
 
     All are 1 or 0: hot flows; energy from the base (F21 > 0); lost in the interior (delta > 0); more from the base
     than hot flows can lose (lambda >= 3); the volume fraction of hot flows rising with height (lambda > 0.660).
@@ -176,29 +176,29 @@ def hot_code(plane: Plane, outer: float, inner: float) -> Code:
     )
 
 
-def _neutral(plane: Plane) -> dict[str, Any]:
+def _neutral(plane: ParameterPlane) -> dict[str, Any]:
     """Values in the middle of those parameters that one grid serves all values of."""
     return {axis.name: float(axis.at(0.5)) for axis in (plane.x, plane.y) if PARAMETERS[axis.name].of_base}
 
 
 @lru_cache(maxsize=4)
-def _grid(plane: Plane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
+def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
     """The grid of trajectories of all points of ``plane`` whose grains, with their law, and slope are those of
     ``chute``, and its extremes."""
     del registered  # known here to tell what is remembered of one law from that of another
     served = [chute]
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:
-            shares = np.linspace(0.0, 1.0, _BETWEEN)
-            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in shares]
+            fractions = np.linspace(0.0, 1.0, _BETWEEN)
+            served = [replace(base, **{axis.name: float(axis.at(s))}) for base in served for s in fractions]
     within = plane.within
-    temperature = starts(within.coldest, within.hottest)
+    temperature = starting_temperatures(within.coldest, within.hottest)
     if plane.temperatures:
         apart = np.abs(np.log(temperature[:, None] / np.array(plane.temperatures))).min(axis=1)
         temperature = np.unique(np.concatenate([temperature[apart > _SAME], plane.temperatures]))
     others = envelope([model(base) for base in served]) if len(served) > 1 else np.empty((ENTRIES, 0))
-    grid = carry_down_for(model(chute), others, temperature, within.deepest)
-    return grid, extremes_on(grid)
+    grid = integrate_trajectories_from(model(chute), others, temperature, within.deepest)
+    return grid, bound_extremes(grid)
 
 
 @lru_cache(maxsize=64)

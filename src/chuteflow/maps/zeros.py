@@ -30,10 +30,10 @@ _APART = 2.5
 _EVEN = 12.0
 #: Weights of a cubic whose sizes sum to more extrapolate.
 _SOUND = 3.0
-#: Zeros are near to each other within this share of the distances around.
+#: Zeros are near to each other within this fraction of the distances around.
 _NEAR = 0.3
 #: Surface temperatures of neighbours tell them apart if their logarithms differ by more.
-_TOLD = 1e-7
+_DISTINCT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,28 +66,28 @@ class Zeros:
         """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
         grid = self.grid
         zeros = grid.zeros[which]
-        rows = grid.rows_of(zeros[:, :2].astype(np.int64))
+        rows = grid.steps_of(zeros[:, :2].astype(np.int64))
         places = np.where(rows[:, 0] == rows[:, 1], zeros[:, 0] + zeros[:, 2], zeros[:, 1])
-        return kernel.extremes_back(
+        return kernel.find_extremes(
             grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
         )
 
 
-def extremes_on(grid: TrajectoryGrid) -> Array:
+def bound_extremes(grid: TrajectoryGrid) -> Array:
     """Bounds of what trajectories have had down to each state, whatever their base, (N, 6), as in :class:`Zeros`."""
-    return kernel.extremes(
+    return kernel.bound_extremes(
         grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
     )
 
 
-def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
+def evaluate_zeros(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     """The zeros of B on ``grid``, given its ``extremes`` (N, 6)."""
     ends = grid.zeros[:, :2].astype(np.int64)
     share = grid.zeros[:, 2]
-    rows = grid.rows_of(ends)
+    rows = grid.steps_of(ends)
     across = rows[:, 0] == rows[:, 1]
     used, back = np.unique(ends, return_inverse=True)
-    known = _Known.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
+    known = _StateValues.at(grid, used, np.searchsorted(grid.first, used, side="right") - 1)
     one, two = back.reshape(ends.shape).T
 
     # Along a trajectory: Hermite's cubic in ln P.
@@ -95,8 +95,8 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     place = share.copy()
     down = ~across
     one_down, two_down, apart = one[down], two[down], step[down]
-    ends_down = known.excess[one_down], known.excess[two_down]
-    slopes = known.excess_down[one_down] * apart, known.excess_down[two_down] * apart
+    ends_down = known.residual[one_down], known.residual[two_down]
+    slopes = known.residual_down[one_down] * apart, known.residual_down[two_down] * apart
     place[down] = false_position(lambda t: _hermite(*ends_down, *slopes, t), share[down])
 
     def between(of: Array, down: Array) -> Array:
@@ -110,12 +110,12 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     place[across], found = _through_four(grid, ends[across, 0], rows[across, 0], share[across])
     log_q[across], log_t[across], big_l[across], y[across] = found
 
-    excess_down, excess_across, flux_down, flux_across = (
+    residual_down, residual_across, flux_down, flux_across = (
         of[one] + share * (of[two] - of[one])
-        for of in (known.excess_down, known.excess_across, known.flux_down, known.flux_across)
+        for of in (known.residual_down, known.residual_across, known.flux_down, known.flux_across)
     )
-    size = np.abs(excess_down) + np.abs(excess_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
-    rise = (flux_across * excess_down - flux_down * excess_across) / size
+    size = np.abs(residual_down) + np.abs(residual_across) + np.abs(flux_down) + np.abs(flux_across) + 1e-300
+    rise = (flux_across * residual_down - flux_down * residual_across) / size
     # The extrema are those above, or those at the base.
     low, high = extremes[ends[:, 0]], np.where(down[:, None], extremes[ends[:, 0]], extremes[ends[:, 1]])
     bounds, doubt = low + place[:, None] * (high - low), 0.5 * np.abs(high - low)[:, :3]
@@ -123,7 +123,7 @@ def zeros_on(grid: TrajectoryGrid, extremes: Array) -> Zeros:
     bounds[:, ::3] = np.minimum(bounds[:, ::3], net[:, None])
     bounds[:, 1::3] = np.maximum(bounds[:, 1::3], net[:, None])
     bounds[:, 2::3] = np.maximum(bounds[:, 2::3], curving[:, None])
-    scattered = across & (np.abs(grid.states[ends[:, 1], S_T] - grid.states[ends[:, 0], S_T]) < _TOLD)
+    scattered = across & (np.abs(grid.states[ends[:, 1], S_T] - grid.states[ends[:, 0], S_T]) < _DISTINCT)
     return Zeros(grid, log_q, log_m, log_t, rise, bounds, doubt, scattered)
 
 
@@ -136,43 +136,43 @@ def _at_base(grid: TrajectoryGrid, big_l: Array, y: Array, over: Array) -> tuple
 
 
 @dataclass(frozen=True, eq=False)
-class _Known:
+class _StateValues:
     """What is known at states (k,): ln M, L, y, B, ln Q, and their derivatives to ln P and from neighbour to
     neighbour."""
 
     log_m: Array
     big_l: Array
     y: Array
-    excess: Array
+    residual: Array
     log_q: Array
     l_down: Array
     y_down: Array
-    excess_down: Array
+    residual_down: Array
     flux_down: Array
-    excess_across: Array
+    residual_across: Array
     flux_across: Array
 
     @classmethod
-    def at(cls, grid: TrajectoryGrid, places: Index, rows: Index) -> _Known:
+    def at(cls, grid: TrajectoryGrid, places: Index, rows: Index) -> _StateValues:
         model = grid.model
         over = grid.overburden[rows]
         p = over + model.surface_stress
-        big_l, y, _t, _h, glide = grid.states[places].T
+        big_l, y, _t, _h, shear_flux = grid.states[places].T
         f, df = model.closures(np.exp(big_l))
         base, base_slope = model.base_flux(f), model.base_flux_slope(df)
         slip = model.slip(f)
         root_t = np.exp(0.5 * (np.log(p) + f[GAMMA] - big_l))
-        sliding = slip * root_t * over
-        flux = sliding + glide
+        slip_flux = slip * root_t * over
+        flux = slip_flux + shear_flux
         turn = p * y / f[CONDUCTION] - model.beta
         still = 1.0 - turn
         warming = turn + f[COUPLING] * still
-        dilation, share = over / p, sliding / flux
+        dilation, share = over / p, slip_flux / flux
         l_down = dilation * still
         y_down = over * (f[LOSS] - model.slope**2 * f[WORK]) - dilation * y * (1.0 + 0.5 * warming)
         by_l = model.slip_slope(df) / slip + 0.5 * (df[GAMMA] - 1.0)
-        glide_down = model.slope * over**2 * f[WORK] * root_t
-        l_across, y_across, glide_across = _across(grid, places, rows)
+        shear_down = model.slope * over**2 * f[WORK] * root_t
+        l_across, y_across, shear_across = _across(grid, places, rows)
         return cls(
             np.log(over),
             big_l,
@@ -182,9 +182,9 @@ class _Known:
             l_down,
             y_down,
             y_down - base_slope * l_down,
-            share * (1.0 + 0.5 * dilation + by_l * l_down) + glide_down / flux,
+            share * (1.0 + 0.5 * dilation + by_l * l_down) + shear_down / flux,
             y_across - base_slope * l_across,
-            share * by_l * l_across + glide_across / flux,
+            share * by_l * l_across + shear_across / flux,
         )
 
 
@@ -195,8 +195,8 @@ def _labels(grid: TrajectoryGrid, around: Index) -> tuple[Array, NDArray[np.bool
     place = np.where(big_l > DILUTE, big_l, DILUTE + DILUTE_WEIGHT * (big_l - DILUTE))
     apart = np.hypot(np.diff(place, axis=1), np.diff(state[..., S_Y], axis=1) / grid.scale)
     gaps = np.diff(state[..., S_T], axis=1)
-    told = (gaps > _TOLD).all(axis=1, keepdims=True)
-    gaps = np.where(told, gaps, np.maximum(apart, 1e-14))
+    resolved = (gaps > _DISTINCT).all(axis=1, keepdims=True)
+    gaps = np.where(resolved, gaps, np.maximum(apart, 1e-14))
     joined = apart < _APART * grid.refinement.delta
     labels = np.concatenate([np.zeros((len(around), 1)), np.cumsum(gaps, axis=1)], axis=1)
     return labels, joined
@@ -240,8 +240,8 @@ def _slope_weights(at: Array) -> Array:
 
 
 def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) -> tuple[Array, Array]:
-    """The share of the way at zeros between states ``left`` and the next, and there ln Q, ln T_surface, L and y (4, k):
-    of the cubic through four neighbours where they are in one piece and even enough, else on the line."""
+    """The fraction of the way at zeros between states ``left`` and the next, and there ln Q, ln T_surface, L and y (4,
+    k): of the cubic through four neighbours where they are in one piece and even enough, else on the line."""
     around = left[:, None] + np.arange(-1, 3)
     low, high = grid.first[rows], grid.first[rows + 1] - 1
     inside = (around[:, 0] >= low) & (around[:, 3] <= high)
@@ -250,7 +250,7 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     state = grid.states[around]
     quantities = grid.quantities(around)
     f, _ = grid.model.closures(np.exp(state[..., S_L]))
-    excess = state[..., S_Y] - grid.model.base_flux(f)
+    residual = state[..., S_Y] - grid.model.base_flux(f)
     weights = np.zeros(around.shape)
     weights[:, 1], weights[:, 2] = 1.0 - share, share
     gaps = np.diff(labels, axis=1)
@@ -258,7 +258,7 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
     even &= (gaps[:, [0, 2]] < _EVEN * gaps[:, 1:2]).all(axis=1) & (gaps[:, [0, 2]] * _EVEN > gaps[:, 1:2]).all(axis=1)
     if even.any():
         at = ((labels[even] - labels[even, 1:2]) / gaps[even, 1:2]).T
-        values = excess[even].T
+        values = residual[even].T
         place = false_position(lambda x: (lagrange(at, x) * values).sum(axis=0), share[even])
         cubic = lagrange(at, place)
         sound = np.abs(cubic).sum(axis=0) < _SOUND

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
+from functools import cached_property, lru_cache
 from typing import cast
 
 import numpy as np
@@ -35,26 +35,83 @@ class Grid:
         """Degree n of the interpolant."""
         return len(self.nodes) - 1
 
+    def differentiate(self, values: Array) -> Array:
+        """Derivatives at the nodes of the interpolants of ``values`` (..., n+1)."""
+        return values @ self.derivative.T
+
+    def integrate(self, values: Array) -> Array:
+        """Integrals from 0 to the nodes of the interpolants of ``values`` (..., n+1)."""
+        return values @ self.integral.T
+
+    def interpolate(self, values: Array, points: Array) -> Array:
+        """The interpolants of ``values`` (..., n+1) at ``points`` (m,), (..., m)."""
+        return values @ interpolation_matrix(self, points).T
+
 
 @dataclass(frozen=True)
 class PiecewiseGrid:
     """The grid of one degree d on each of the pieces between ``breaks`` (N+1,), from 0 to 1; pieces share their ends.
 
-    ``nodes`` (N d + 1,); ``derivative``, ``integral`` and ``weights`` as in :class:`Grid`, of the piecewise
-    polynomial. At a break the derivative is that of the piece to the left.
+    ``nodes`` (N d + 1,) and ``weights`` as in :class:`Grid`, of the piecewise polynomial. At a break the derivative is
+    that of the piece to the left. The methods take a time that rises with the number of nodes, the matrices with its
+    square.
     """
 
     breaks: Array
     piece: Grid
     nodes: Array
-    derivative: Array
-    integral: Array
     weights: Array
 
     @property
     def degree(self) -> int:
         """Number of nodes less one."""
         return len(self.nodes) - 1
+
+    @cached_property
+    def derivative(self) -> Array:
+        """Matrix (N d + 1, N d + 1) of :meth:`differentiate`."""
+        return _of_method(self.differentiate, len(self.nodes))
+
+    @cached_property
+    def integral(self) -> Array:
+        """Matrix (N d + 1, N d + 1) of :meth:`integrate`."""
+        return _of_method(self.integrate, len(self.nodes))
+
+    def differentiate(self, values: Array) -> Array:
+        """Derivatives at the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""
+        return self._joined(self.piece.differentiate(values[..., self.columns]) / self._widths)
+
+    def integrate(self, values: Array) -> Array:
+        """Integrals from 0 to the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""
+        parts = self.piece.integrate(values[..., self.columns]) * self._widths
+        parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1:], axis=-2)
+        return self._joined(parts)
+
+    def interpolate(self, values: Array, points: Array) -> Array:
+        """The piecewise polynomials through ``values`` (..., N d + 1) at ``points`` (m,), (..., m)."""
+        piece, matrix = self.places(points)
+        return np.einsum("...md,md->...m", values[..., self.columns[piece]], matrix)
+
+    def places(self, points: Array) -> tuple[NDArray[np.intp], Array]:
+        """The piece (m,) in which each of ``points`` (m,) lies, and the matrix (m, d+1) of interpolation there."""
+        piece = np.clip(np.searchsorted(self.breaks, points, side="left") - 1, 0, len(self.breaks) - 2)
+        local = (points - self.breaks[piece]) / np.diff(self.breaks)[piece]
+        return piece, interpolation_matrix(self.piece, local)
+
+    @cached_property
+    def columns(self) -> NDArray[np.intp]:
+        """The nodes of each piece, (N, d+1)."""
+        return np.arange(len(self.breaks) - 1)[:, None] * self.piece.degree + np.arange(self.piece.degree + 1)
+
+    @property
+    def _widths(self) -> Array:
+        return np.diff(self.breaks)[:, None]
+
+    @staticmethod
+    def _joined(parts: Array) -> Array:
+        """Values (..., N, d+1) on the pieces as values at the nodes: at a break those of the piece to the left."""
+        rest = parts[..., 1:].reshape(*parts.shape[:-2], -1)
+        return np.concatenate([parts[..., 0, :1], rest], axis=-1)
 
 
 AnyGrid = Grid | PiecewiseGrid
@@ -65,24 +122,24 @@ def piecewise_grid(breaks: tuple[float, ...], degree: int) -> PiecewiseGrid:
     """The grid of ``degree`` on each piece between ``breaks``, which rise from 0 to 1."""
     piece = grid(degree)
     b = np.array(breaks)
-    count = len(b) - 1
-    size = count * degree + 1
-    nodes = np.empty(size)
-    derivative, integral, weights = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
-    for e, (low, high) in enumerate(pairwise(breaks)):
+    size = (len(b) - 1) * degree + 1
+    nodes, weights = np.empty(size), np.zeros(size)
+    for e in range(len(b) - 1):
         here = slice(e * degree, (e + 1) * degree + 1)
-        width = high - low
-        nodes[here] = low + width * piece.nodes
-        nodes[here.stop - 1] = high
-        rows = slice(here.start + (e > 0), here.stop)
-        derivative[rows, here] = piece.derivative[(e > 0) :] / width
-        # Below this piece all of it counts, in it the integral up to the node.
-        integral[here.stop :, here] += width * piece.weights
-        integral[rows, here] += width * piece.integral[(e > 0) :]
+        width = b[e + 1] - b[e]
+        nodes[here] = b[e] + width * piece.nodes
+        nodes[here.stop - 1] = b[e + 1]
         weights[here] += width * piece.weights
-    for array in (b, nodes, derivative, integral, weights):
+    for array in (b, nodes, weights):
         array.setflags(write=False)
-    return PiecewiseGrid(b, piece, nodes, derivative, integral, weights)
+    return PiecewiseGrid(b, piece, nodes, weights)
+
+
+def _of_method(method: Callable[[Array], Array], size: int) -> Array:
+    """The matrix of a linear ``method`` on (..., ``size``)."""
+    matrix = np.ascontiguousarray(method(np.eye(size)).T)
+    matrix.setflags(write=False)
+    return matrix
 
 
 @lru_cache(maxsize=64)
@@ -138,12 +195,9 @@ def _integrals_of_basis(angle: Array) -> Array:
 def interpolation_matrix(g: AnyGrid, points: Array) -> Array:
     """Matrix (m, n+1) that takes values at the nodes to values at ``points`` (m,) in [0, 1]."""
     if isinstance(g, PiecewiseGrid):
-        degree = g.piece.degree
-        piece = np.clip(np.searchsorted(g.breaks, points, side="left") - 1, 0, len(g.breaks) - 2)
-        local = (points - g.breaks[piece]) / np.diff(g.breaks)[piece]
+        piece, local = g.places(points)
         matrix = np.zeros((len(points), len(g.nodes)))
-        columns = piece[:, None] * degree + np.arange(degree + 1)
-        np.put_along_axis(matrix, columns, interpolation_matrix(g.piece, local), axis=1)
+        np.put_along_axis(matrix, g.columns[piece], local, axis=1)
         return matrix
     gap = points[:, None] - g.nodes
     hit = gap == 0.0
@@ -165,8 +219,7 @@ def refinement(coarse: int, fine: int) -> Array:
 def tail(g: AnyGrid, values: Array) -> float:
     """Relative size of the last coefficients of ``values`` (..., n+1): how far the series has decayed."""
     if isinstance(g, PiecewiseGrid):
-        columns = np.arange(len(g.breaks) - 1)[:, None] * g.piece.degree + np.arange(g.piece.degree + 1)
-        return tail(g.piece, values[..., columns])
+        return tail(g.piece, values[..., g.columns])
     coefficients = np.abs(values @ g.to_coefficients.T)
     last = max(2, g.degree // 8)
     return float(coefficients[..., -last:].max() / (coefficients.max() + 1e-300))

@@ -39,10 +39,10 @@ CAUTION = 4.0
 WIDE = 1e-3
 #: How far a trial of the ITP method is pushed across the zero of the secant, in units of the first bracket.
 PUSH = 0.02
-#: How far beyond the end of a segment a change of sign is looked for, as a share of the chord.
+#: How far beyond the end of a segment a change of sign is searched for, as a fraction of the chord.
 FARTHEST = 0.1
 #: A curve is closed by a segment that passes its start within this part of its length, at up to this angle,
-#: and may miss its ends by this share.
+#: and may miss its ends by this fraction.
 CLOSE, PARALLEL, SLACK = 0.02, 0.1, 1e-6
 EPSILON = float(np.finfo(float).eps)
 
@@ -77,7 +77,7 @@ S = TypeVar("S", bound=System)
 Monitor = Callable[[Array, Array, S], float]
 
 
-class Status(enum.Enum):
+class ContinuationStatus(enum.Enum):
     """What became of a computation, and what to try next."""
 
     RUNNING = "The curve goes on: ask for the next point."
@@ -111,11 +111,11 @@ class Status(enum.Enum):
     @property
     def failed(self) -> bool:
         """Whether the computation ended before it had done what was asked."""
-        return self not in (Status.RUNNING, Status.LOCATED, Status.MAX_POINTS)
+        return self not in (ContinuationStatus.RUNNING, ContinuationStatus.LOCATED, ContinuationStatus.MAX_POINTS)
 
 
 @dataclass(frozen=True)
-class Control:
+class ContinuationSettings:
     """How a curve is followed.
 
     ``initial_step``, ``min_step`` and ``max_step`` are lengths in the inner product of the system (the first
@@ -153,19 +153,19 @@ class Control:
                 raise InputError(f"{name} is {getattr(self, name)!r}: it must be {meaning}.")
 
 
-DEFAULT = Control()
+DEFAULT = ContinuationSettings()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Point(Generic[S]):
+class CurvePoint(Generic[S]):
     """A point of a solution curve; its arrays are read-only.
 
     ``z`` (n+1,) solves ``system``; ``tangent`` (n+1,) has <t, t> = 1 and points onward. It belongs to the
     last Jacobian and is less exact than z: mostly to 1e-7, at worst to 1e-5 or so, for the default tolerance;
     at a located point to round-off. ``arclength`` is measured from the start of the trace; ``step`` is the
     length asked for on the way here, 0 at the start and where the discretisation changed; ``iterations`` is
-    the number of Newton corrections; ``error`` is the estimated size of the next one, in the norm of Control,
-    without what the rounding of the residual adds.
+    the number of Newton corrections; ``error`` is the estimated size of the next one, in the norm of
+    ContinuationSettings, without what the rounding of the residual adds.
     """
 
     z: Array
@@ -203,7 +203,7 @@ class _Metric:
         return math.sqrt(self.inner(a, a))
 
     def size(self, a: Array) -> float:
-        """The weighted max norm of Control."""
+        """The weighted max norm of ContinuationSettings."""
         return float(np.abs(self._scale * a).max())
 
     def angle(self, t: Array, u: Array) -> float:
@@ -244,7 +244,7 @@ def _hook(system: S) -> Callable[[Array, Array], tuple[S, Array, Array] | None]:
 class _Corrector(Generic[S]):
     """Newton's method for a system and one more equation, and the choice of that equation."""
 
-    def __init__(self, system: S, control: Control) -> None:
+    def __init__(self, system: S, control: ContinuationSettings) -> None:
         self.system = system
         self.metric = metric = _Metric(system.weights)
         self.adapted = _hook(system)
@@ -276,7 +276,7 @@ class _Corrector(Generic[S]):
         second = int(share.argmax())
         return second if share[second] >= max(SECOND * largest, share_before[second]) else first
 
-    def correct(self, z: Array, row: Array, *, sharp: bool = False) -> _Corrected | Status:
+    def correct(self, z: Array, row: Array, *, sharp: bool = False) -> _Corrected | ContinuationStatus:
         """The solution of F(z) = 0 in the hyperplane of ``row`` through ``z``, and its tangent, row t > 0.
 
         The factorisation that gives a correction gives the tangent too. The iteration ends when the next
@@ -291,11 +291,11 @@ class _Corrector(Generic[S]):
             try:
                 solution = cast(Array, np.linalg.solve(matrix, sides))
             except np.linalg.LinAlgError:
-                return Status.SINGULAR
+                return ContinuationStatus.SINGULAR
             step = solution[:, 0]
             size = self.metric.size(step)
             if not size < math.inf:
-                return Status.LEFT_DOMAIN
+                return ContinuationStatus.LEFT_DOMAIN
             z = z - step
             before = sizes[-1] if sizes else math.inf
             error = _next_correction(size, before) if sizes else size
@@ -308,65 +308,65 @@ class _Corrector(Generic[S]):
                 return self._with_tangent(z, solution[:, 1], sizes, error)
             if size >= before:
                 break
-        return Status.NOT_CONVERGED
+        return ContinuationStatus.NOT_CONVERGED
 
-    def _with_tangent(self, z: Array, t: Array, sizes: list[float], error: float) -> _Corrected | Status:
+    def _with_tangent(self, z: Array, t: Array, sizes: list[float], error: float) -> _Corrected | ContinuationStatus:
         length = self.metric.norm(t)
         if not 0.0 < length < math.inf:
-            return Status.SINGULAR
+            return ContinuationStatus.SINGULAR
         return _Corrected(z, t / length, len(sizes), error, sizes[0], sizes[1] if len(sizes) > 1 else 0.0)
 
-    def point(self, corrected: _Corrected, tangent: Array, arclength: float, step: float) -> Point[S]:
+    def point(self, corrected: _Corrected, tangent: Array, arclength: float, step: float) -> CurvePoint[S]:
         z = corrected.z
         z.setflags(write=False)
         tangent.setflags(write=False)
-        return Point(z, tangent, arclength, step, corrected.iterations, corrected.error, self.system)
+        return CurvePoint(z, tangent, arclength, step, corrected.iterations, corrected.error, self.system)
 
 
-class Trace(Iterator[Point[S]]):
+class Trace(Iterator[CurvePoint[S]]):
     """The points of a solution curve, one after the other; made by :func:`trace`.
 
     When the iteration ends, ``status`` says why, in a sentence that says what to try next.
     """
 
-    def __init__(self, corrector: _Corrector[S], control: Control, start: Array, direction: Array) -> None:
-        self.status = Status.RUNNING
+    def __init__(self, corrector: _Corrector[S], control: ContinuationSettings, start: Array, direction: Array) -> None:
+        self.status = ContinuationStatus.RUNNING
         self._corrector = corrector
         self._control = control
         self._start, self._direction = start, direction
         self._count = 0
         self._step = min(control.initial_step, control.max_step)
         self._curvature = 0.0
-        self._previous: Point[S] | None = None
-        self._point: Point[S] | None = None
+        self._previous: CurvePoint[S] | None = None
+        self._point: CurvePoint[S] | None = None
         self._just_adapted = False
 
-    def __next__(self) -> Point[S]:
-        if self.status is Status.RUNNING:
+    def __next__(self) -> CurvePoint[S]:
+        if self.status is ContinuationStatus.RUNNING:
             following = self._following()
-            if not isinstance(following, Status):
+            if not isinstance(following, ContinuationStatus):
                 self._point = following
                 self._count += 1
                 return following
             self.status = following
         raise StopIteration
 
-    def _following(self) -> Point[S] | Status:
+    def _following(self) -> CurvePoint[S] | ContinuationStatus:
         if self._count == self._control.max_points:
-            return Status.MAX_POINTS
+            return ContinuationStatus.MAX_POINTS
         if self._point is None:
             return self._started()
         adapted = None if self._just_adapted else self._adapted(self._point)
         self._just_adapted = adapted is not None
         return self._stepped(self._point) if adapted is None else adapted
 
-    def _started(self) -> Point[S] | Status:
+    def _started(self) -> CurvePoint[S] | ContinuationStatus:
         corrected = self._corrector.correct(self._start, self._direction)
-        if isinstance(corrected, Status):
-            return Status.START_FAILED
+        if isinstance(corrected, ContinuationStatus):
+            return ContinuationStatus.START_FAILED
         return self._corrector.point(corrected, corrected.tangent, 0.0, 0.0)
 
-    def _adapted(self, point: Point[S]) -> Point[S] | Status | None:
+    def _adapted(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus | None:
         """The point on the discretisation that the system asks for, if it does."""
         changed = self._corrector.adapted(point.z, point.tangent)
         if changed is None:
@@ -377,16 +377,16 @@ class Trace(Iterator[Point[S]]):
         ahead = corrector.metric.vector("tangent carried over", tangent)
         near = corrector.metric.vector("point carried over", z)
         corrected = corrector.correct(near, corrector.border(ahead))
-        if isinstance(corrected, Status):
-            return Status.ADAPTATION_FAILED
+        if isinstance(corrected, ContinuationStatus):
+            return ContinuationStatus.ADAPTATION_FAILED
         tangent = corrector.metric.along(corrected.tangent, ahead)
         return corrector.point(corrected, tangent, point.arclength, 0.0)
 
-    def _stepped(self, point: Point[S]) -> Point[S] | Status:
+    def _stepped(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus:
         """The next point; the step is halved until it succeeds, and then not allowed to grow at once."""
         control = self._control
         largest_growth = GROWTH
-        while isinstance(tried := self._tried(point, self._step), Status):
+        while isinstance(tried := self._tried(point, self._step), ContinuationStatus):
             if self._step <= control.min_step:
                 return tried
             self._step = max(0.5 * self._step, control.min_step)
@@ -397,20 +397,20 @@ class Trace(Iterator[Point[S]]):
         self._previous = point
         return following
 
-    def _tried(self, point: Point[S], step: float) -> tuple[Point[S], float] | Status:
+    def _tried(self, point: CurvePoint[S], step: float) -> tuple[CurvePoint[S], float] | ContinuationStatus:
         """The point one ``step`` further, and the factor by which the next step may differ."""
         corrector, metric, control = self._corrector, self._corrector.metric, self._control
         predicted = _extrapolated(self._previous, point, step)
         before = None if self._previous is None else self._previous.tangent
         corrected = corrector.correct(predicted, corrector.border(point.tangent, before))
-        if isinstance(corrected, Status):
+        if isinstance(corrected, ContinuationStatus):
             return corrected
         tangent = metric.along(corrected.tangent, point.tangent)
         angle = metric.angle(point.tangent, tangent)
         arc = metric.arc(point.z, corrected.z, angle)
         astray = arc < ASTRAY * step or metric.norm(corrected.z - predicted) > ASTRAY * step
         if astray or angle > control.max_angle:
-            return Status.SHARP_TURN
+            return ContinuationStatus.SHARP_TURN
         growth = _growth_by_convergence(corrected, control.tolerance)
         if angle > 0.0:
             growth = min(growth, self._growth_by_curvature(angle, arc))
@@ -423,7 +423,7 @@ class Trace(Iterator[Point[S]]):
         return max(1.0 / GROWTH, AIM * self._control.max_angle / (angle * rise))
 
 
-def trace(system: S, start: Array, *, direction: Array, control: Control = DEFAULT) -> Trace[S]:
+def trace(system: S, start: Array, *, direction: Array, control: ContinuationSettings = DEFAULT) -> Trace[S]:
     """Follow the solution curve of ``system`` from the point near ``start`` (n+1,), lazily.
 
     ``direction`` (n+1,) is a row c: the start is corrected with c.z held, and the curve is followed to where
@@ -452,7 +452,7 @@ def _cubic(a: Array, slope_a: Array, b: Array, slope_b: Array, x: float) -> Arra
     return b + (u + square + cube) * slope_b + cube * slope_a - (square + 2.0 * cube) * (b - a)
 
 
-def _extrapolated(previous: Point[S] | None, point: Point[S], step: float) -> Array:
+def _extrapolated(previous: CurvePoint[S] | None, point: CurvePoint[S], step: float) -> Array:
     """The curve one ``step`` beyond ``point``: the cubic through the last two points, or the tangent."""
     if previous is None:
         return point.z + step * point.tangent
@@ -494,36 +494,36 @@ class Located(Generic[S]):
     bracket and the noise of the monitor. Where ``status`` is a failure, the bracket is the last one before.
     """
 
-    point: Point[S]
+    point: CurvePoint[S]
     value: float
     error: float
-    status: Status
+    status: ContinuationStatus
 
 
 class _Trial(NamedTuple, Generic[S]):
-    """A point of the curve, its share of the chord that it projects to, and the monitor's value there."""
+    """A point of the curve, its fraction of the chord that it projects to, and the monitor's value there."""
 
     share: float
     value: float
-    point: Point[S]
+    point: CurvePoint[S]
 
 
 class _Bracket(NamedTuple, Generic[S]):
-    """Two trials around a change of sign, the monitor's slope over the share of the chord, and a status."""
+    """Two trials around a change of sign, the monitor's slope over the fraction of the chord, and a status."""
 
     left: _Trial[S]
     right: _Trial[S]
     slope: float
-    status: Status
+    status: ContinuationStatus
 
 
 def locate(
-    point_a: Point[S],
-    point_b: Point[S],
+    point_a: CurvePoint[S],
+    point_b: CurvePoint[S],
     system: S,
     monitor: Monitor[S],
     *,
-    control: Control = DEFAULT,
+    control: ContinuationSettings = DEFAULT,
     tolerance: float = 0.0,
 ) -> Located[S]:
     """The point between two successive points of a trace where ``monitor(z, tangent, system)`` changes sign.
@@ -542,7 +542,7 @@ def locate(
         raise InputError(f"The monitor is {left.value} and {right.value} at the two points: it must change its sign.")
     fine = segment.finest(tolerance)
     bracket = _shrunk(segment, left, right, fine)
-    if bracket.status is Status.LOCATED and (bracket.left is left) != (bracket.right is right):
+    if bracket.status is ContinuationStatus.LOCATED and (bracket.left is left) != (bracket.right is right):
         bracket = _beyond_the_end(segment, bracket, fine)
     left, right = bracket.left, bracket.right
     best = min(left, right, key=lambda trial: abs(trial.value))
@@ -554,7 +554,7 @@ def locate(
 
 
 def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float) -> _Bracket[S]:
-    """The bracket of a change of sign, shrunk to twice a ``fine`` share of the chord, or to the noise."""
+    """The bracket of a change of sign, shrunk to twice a ``fine`` fraction of the chord, or to the noise."""
     start = right.share - left.share
     slope = (right.value - left.value) / start
     for remaining in range(1 + max(0, math.ceil(math.log2(0.5 * start / fine))), 0, -1):
@@ -567,13 +567,13 @@ def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float
             (left.share, right.share), (left.value, right.value), PUSH / start, fine * 2.0**remaining - 0.5 * width
         )
         trial = segment.trial(min(max(share, left.share + fine), right.share - fine))
-        if isinstance(trial, Status):
+        if isinstance(trial, ContinuationStatus):
             return _Bracket(left, right, slope, trial)
         outlying = not min(left.value, right.value) <= trial.value <= max(left.value, right.value)
         left, right = _narrowed(left, trial, right)
         if outlying and width <= WIDE * start:
             break  # So near the zero, only noise makes a monitor go up and down.
-    return _Bracket(left, right, slope, Status.LOCATED)
+    return _Bracket(left, right, slope, ContinuationStatus.LOCATED)
 
 
 def _beyond_the_end(segment: _Segment[S], bracket: _Bracket[S], fine: float) -> _Bracket[S]:
@@ -586,7 +586,7 @@ def _beyond_the_end(segment: _Segment[S], bracket: _Bracket[S], fine: float) -> 
     reach = fine + 2.0 * abs(inside.value / bracket.slope)
     while reach < FARTHEST:
         outside = segment.trial(end + outward * reach)
-        if isinstance(outside, Status):
+        if isinstance(outside, ContinuationStatus):
             break
         if outside.value * inside.value <= 0.0:
             left, right = (outside, inside) if outward < 0.0 else (inside, outside)
@@ -605,7 +605,9 @@ def _narrowed(left: _Trial[S], trial: _Trial[S], right: _Trial[S]) -> tuple[_Tri
 class _Segment(Generic[S]):
     """The stretch of a curve between two points, cut by hyperplanes across the chord between them."""
 
-    def __init__(self, a: Point[S], b: Point[S], system: S, monitor: Monitor[S], control: Control) -> None:
+    def __init__(
+        self, a: CurvePoint[S], b: CurvePoint[S], system: S, monitor: Monitor[S], control: ContinuationSettings
+    ) -> None:
         self._corrector = corrector = _Corrector(system, control)
         self._metric = metric = corrector.metric
         self._monitor = monitor
@@ -616,39 +618,39 @@ class _Segment(Generic[S]):
             raise InputError("The points are not two successive points of a trace: their tangents lead elsewhere.")
 
     def finest(self, tolerance: float) -> float:
-        """Half the share of the chord that is as long as ``tolerance``, or that round-off allows."""
+        """Half the fraction of the chord that is as long as ``tolerance``, or that round-off allows."""
         metric, a, b = self._metric, self._a, self._b
         length = metric.arc(a.z, b.z, metric.angle(a.tangent, b.tangent))
         round_off = EPSILON * (1.0 + metric.size(a.z) / metric.size(self._chord))
         return max(0.5 * tolerance / length, 4.0 * round_off)
 
-    def speed(self, point: Point[S]) -> float:
-        """Arclength per share of the chord."""
+    def speed(self, point: CurvePoint[S]) -> float:
+        """Arclength per fraction of the chord."""
         return float(self._row @ self._chord / (self._row @ point.tangent))
 
-    def end(self, share: float, point: Point[S]) -> _Trial[S]:
+    def end(self, share: float, point: CurvePoint[S]) -> _Trial[S]:
         return _Trial(share, self._monitor(point.z, point.tangent, self._corrector.system), point)
 
-    def trial(self, share: float) -> _Trial[S] | Status:
+    def trial(self, share: float) -> _Trial[S] | ContinuationStatus:
         metric, a = self._metric, self._a
         near = _across(self._row, a, self._b, share)
         corrected = self._corrector.correct(near, self._row, sharp=True)
-        if isinstance(corrected, Status):
+        if isinstance(corrected, ContinuationStatus):
             return corrected
         arc = metric.arc(a.z, corrected.z, metric.angle(a.tangent, corrected.tangent))
         step = math.copysign(arc, share)
         point = self._corrector.point(corrected, corrected.tangent, a.arclength + step, step)
         trial = self.end(share, point)
-        return trial if math.isfinite(trial.value) else Status.LEFT_DOMAIN
+        return trial if math.isfinite(trial.value) else ContinuationStatus.LEFT_DOMAIN
 
 
-def _across(row: Array, a: Point[S], b: Point[S], x: float) -> Array:
-    """The cubic through two points, where the product with ``row`` has made the share ``x`` of its way."""
+def _across(row: Array, a: CurvePoint[S], b: CurvePoint[S], x: float) -> Array:
+    """The cubic through two points, where the product with ``row`` has made the fraction ``x`` of its way."""
     length = row @ (b.z - a.z)
     return _cubic(a.z, length / (row @ a.tangent) * a.tangent, b.z, length / (row @ b.tangent) * b.tangent, x)
 
 
-def closes(start: Point[S], previous: Point[S], current: Point[S]) -> bool:
+def closes(start: CurvePoint[S], previous: CurvePoint[S], current: CurvePoint[S]) -> bool:
     """Whether the curve returned to ``start``, with its tangent, between ``previous`` and ``current``.
 
     Of a trace from ``start`` on, the answer is True for the first pair of successive points that has the

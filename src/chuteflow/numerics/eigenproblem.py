@@ -18,7 +18,7 @@ from chuteflow.numerics.chebyshev import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-#: Eigenvalues of the inverse below this share of its norm belong to the conditions.
+#: Eigenvalues of the inverse below this fraction of its norm belong to the conditions.
 _VANISHING = 1e-13
 
 
@@ -122,7 +122,7 @@ class Eigenpair:
         return float(others / own)
 
 
-def refined(matrix: Complex, weights: Array, near: complex, steps: int = 5) -> tuple[complex, Complex]:
+def refine_eigenvalue(matrix: Complex, weights: Array, near: complex, steps: int = 5) -> tuple[complex, Complex]:
     """The eigenvalue closest to ``near`` and its vector, by inverse iteration with one factorisation.
 
     ``near`` is to be much closer to it than to all others, such as its value in another discretisation.
@@ -130,7 +130,7 @@ def refined(matrix: Complex, weights: Array, near: complex, steps: int = 5) -> t
     return _Factors.of(matrix, weights, near).iterated(steps)
 
 
-def refined_pair(
+def refine_eigenpair(
     matrix: Complex, weights: Array, near: complex, steps: int = 5, start: Complex | None = None
 ) -> Eigenpair:
     """The same with the left vector, from the same factors; ``start`` is a vector that is close to the right one."""

@@ -13,12 +13,11 @@ from chuteflow.numerics.chebyshev import Array
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """The last iterate ``z``, whether it ``converged``, ``iterations`` taken and the last step's size."""
+    """The last iterate ``z``, whether it ``converged``, and the ``iterations`` taken."""
 
     z: Array
     converged: bool
     iterations: int
-    last_step: float
 
 
 def newton(
@@ -39,29 +38,28 @@ def newton(
     with np.errstate(all="ignore"):
         f, jacobian = system(z)
         size = float(np.abs(f).max())
-        step_size = np.inf
         for iteration in range(1, max_iterations + 1):
             try:
                 step = np.linalg.solve(jacobian, -f)
             except np.linalg.LinAlgError:
-                return NewtonResult(z, False, iteration, np.inf)
+                return NewtonResult(z, False, iteration)
             step_size = float(np.abs(step).max())
             if not np.isfinite(step_size):
-                return NewtonResult(z, False, iteration, np.inf)
+                return NewtonResult(z, False, iteration)
             if step_size < tolerance:
-                return NewtonResult(z + step, True, iteration, step_size)
-            share = min(1.0, longest_step / step_size)
+                return NewtonResult(z + step, True, iteration)
+            fraction = min(1.0, longest_step / step_size)
             for _ in range(8):
-                trial = z + share * step
+                trial = z + fraction * step
                 f_trial, jacobian_trial = system(trial)
                 size_trial = float(np.abs(f_trial).max())
-                if size_trial < size * (1.0 - 0.1 * share) or step_size < 1e-4:
+                if size_trial < size * (1.0 - 0.1 * fraction) or step_size < 1e-4:
                     break
-                share *= 0.5
+                fraction *= 0.5
             else:
-                return NewtonResult(z, False, iteration, step_size)
+                return NewtonResult(z, False, iteration)
             z, f, jacobian, size = trial, f_trial, jacobian_trial, size_trial
-        return NewtonResult(z, False, max_iterations, step_size)
+        return NewtonResult(z, False, max_iterations)
 
 
 def solve_each(matrices: Array, sides: Array) -> Array:

@@ -16,7 +16,7 @@ from chuteflow.numerics.chebyshev import Array
 _MOST_ITERATIONS = 100
 
 
-def bisected(rising: Callable[[float], float], low: float, high: float, resolution: float = 0.0) -> float:
+def bisect(rising: Callable[[float], float], low: float, high: float, resolution: float = 0.0) -> float:
     """The root of a function that rises from ``low`` to ``high``, by bisection: to the last bit, or to a relative
     ``resolution``."""
     while True:
@@ -83,7 +83,7 @@ def false_position(function: Callable[[Array], Array], start: Array, steps: int 
     return x
 
 
-def zeros(
+def find_zeros(
     function: Callable[[NDArray[np.intp], Array], Array],
     low: Array,
     high: Array,

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FunctionTable:
     """m functions on [lower, upper], constant outside.
 
     ``coefficients`` (degree+1, pieces, 2 m) holds functions and derivatives as powers of t, which runs from
@@ -84,7 +84,7 @@ def tabulate(
     pieces: int,
     degree: int,
     breaks: Sequence[float] = (),
-) -> Table:
+) -> FunctionTable:
     """Interpolate ``function`` (x of shape (k,) to (k, m)) on each piece at Chebyshev points; it may have kinks or
     jumps at the ascending ``breaks``, where pieces meet."""
     points, fit = _chebyshev_fit(degree)
@@ -101,7 +101,7 @@ def tabulate(
     coefficients = np.einsum("kj,pjm->kpm", fit, values[:, : degree + 1])
     check = np.einsum("ck,kpm->pcm", checks[:, None] ** np.arange(degree + 1), coefficients)
     error = np.abs(check - values[:, degree + 1 :]).max(axis=(0, 1))
-    return Table(lower, upper, _with_slopes(coefficients, width), error, tuple(breaks))
+    return FunctionTable(lower, upper, _with_slopes(coefficients, width), error, tuple(breaks))
 
 
 @lru_cache(maxsize=8)
@@ -115,7 +115,7 @@ def _chebyshev_fit(degree: int) -> tuple[Array, Array]:
     return points, to_powers @ np.linalg.inv(chebyshev.chebvander(points, degree))
 
 
-def antiderivative(table: Table) -> Table:
+def antiderivative(table: FunctionTable) -> FunctionTable:
     """The integrals of the functions of ``table`` from its lower end."""
     degree, pieces, twice = table.coefficients.shape
     half: Any = 0.5 * (table.upper - table.lower) / pieces
@@ -127,7 +127,7 @@ def antiderivative(table: Table) -> Table:
     start = (coefficients * (-1.0) ** np.arange(degree + 1)[:, None, None]).sum(axis=0)
     gained = coefficients.sum(axis=0) - start
     coefficients[0] = np.cumsum(gained, axis=0) - gained - start
-    return Table(table.lower, table.upper, _with_slopes(coefficients, 2.0 * half), table.error, table.breaks)
+    return FunctionTable(table.lower, table.upper, _with_slopes(coefficients, 2.0 * half), table.error, table.breaks)
 
 
 def _with_slopes(coefficients: Array, width: Any) -> Array:

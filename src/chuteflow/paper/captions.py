@@ -10,11 +10,11 @@ CAPTIONS = {
     "temperature and velocity against height. Solid: high temperature, dilute (A). Dotted: mid-temperature (B). "
     "Dashed: low temperature, dense (C). Grains and base have e = e_w = 0.8, r = 0.6, here and below unless other "
     "values are given.",
-    3: "The family of flows on the slope 0.3: centre of mass and hold-up against mass flux, and centre of mass "
+    3: "The branch of flows on the slope 0.3: centre of mass and hold-up against mass flux, and centre of mass "
     "against hold-up. The points are the flows of figure 2. Flux folds back twice; hold-up does not.",
     4: "Centre of mass against mass flux for slopes from 0.22 to 0.30 (a) and from 0.30 to 0.36 (b). Solid where the "
     "density is inverted, dashed where it falls with height. Gentle slopes have three flows in a range of flux, "
-    "steep ones two above a least flux. A second, very cold family on the slope 0.34 is not in the paper.",
+    "steep ones two above a least flux. A second, very cold branch on the slope 0.34 is not in the paper.",
     5: "A productive flow: e = 0.9, e_w = 0.6, r = 0.8, slope 0.4, Q = 3. The temperature rises from the base and "
     "has its maximum inside, by very little: the inset enlarges the difference from the value far above.",
     6: "Centre of mass against mass flux of productive flows (e = 0.9, e_w = 0.6, r = 0.8), slopes from 0.40 to "

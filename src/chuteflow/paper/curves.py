@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -12,12 +12,13 @@ import numpy as np
 from chuteflow import Chute
 from chuteflow.branches.counting import flows_at_flux
 from chuteflow.branches.lines import NUMBERS, SteadyBranch, in_order, runs, smooth
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.sources import Source, SteadyCurve, reach
 from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class Curves:
     key: str
     curves: dict[Any, SteadyCurve]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The branches of all curves, special points in their places, one below the other."""
         groups = {
             (name, number): _columns(branch, number)
@@ -38,7 +39,7 @@ class Curves:
         columns = stacked(self.key, groups)
         columns[self.key] = [name for name, _ in columns[self.key]]
         notes = [note for found in self.curves.values() for note in (chute_note(found.chute), *reach(found))]
-        return Table(self.title, tuple(notes), columns)
+        return FigureTable(self.title, tuple(notes), columns)
 
     def flows_at(self, name: Any, mass_flux: float) -> int:
         """How many flows of a curve have this mass flux."""
@@ -68,12 +69,12 @@ def draw_densities(ax: Axes, found: SteadyCurve, **settings: Any) -> None:
     """Centre of mass against mass flux: solid where the density is inverted, dashed where it is monotonic."""
     for branch in found.branches:
         for run in runs(branch):
-            stroke = style.Stroke(style.BLACK, style.OF_DENSITY[run.density])
+            stroke = style.LineStyle(style.BLACK, style.OF_DENSITY[run.density])
             line = smooth(run.flows)
             ax.plot(line["mass_flux"], line["centre_of_mass"], **stroke.line() | settings)
 
 
-def draw_plain(ax: Axes, found: SteadyCurve, stroke: style.Stroke, name: str | None = None) -> None:
+def draw_plain(ax: Axes, found: SteadyCurve, stroke: style.LineStyle, name: str | None = None) -> None:
     """Centre of mass against mass flux in one stroke."""
     for i, branch in enumerate(found.branches):
         line = smooth([point.flow for point in in_order(branch)])
@@ -102,6 +103,16 @@ def name_slopes(ax: Axes, found: Curves, names: Iterable[float], right: float, t
     style.write(ax, begin + 0.54 * width, top, r"slope $\tan\theta$", xytext=(0.0, 13.0), ha="center")
     # The letter of the panel stands clear of them.
     ax.set_title(ax.get_title(loc="left"), loc="left", x=-0.12, **style.title())
+
+
+def draw_two(data: Curves, lines: Mapping[str, tuple[style.LineStyle, str]], right: float, top: float) -> Figure:
+    """One panel with the curves of two chutes, ``lines`` their style and name."""
+    figure, (ax,) = style.panels(1, width=3.8, height=3.2)
+    for name, found in data.curves.items():
+        draw_plain(ax, found, *lines[name])
+    frame(ax, right, top)
+    style.legend(ax, loc="center right")
+    return figure
 
 
 def frame(ax: Axes, right: float, top: float, *, ordinate: bool = True) -> None:

@@ -14,7 +14,7 @@ from chuteflow import Chute, __version__
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FigureTable:
     """``columns`` of one length by name, under a ``title`` and ``notes``."""
 
     title: str
@@ -25,7 +25,7 @@ class Table:
 class FigureData(Protocol):
     """What a figure is drawn from."""
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """All that is drawn."""
         ...
 

@@ -21,39 +21,39 @@ _FLOW = ("flow", "Q", "h", "M", "T at the surface", "estimated relative error")
 
 
 @dataclass(frozen=True)
-class Facts:
+class TextTable:
     """Rows of words under a header."""
 
     header: Row
     rows: Sequence[Row]
 
 
-def facts(data: Any) -> Facts:
+def facts(data: Any) -> TextTable:
     """The facts of a figure, from its data."""
     match data:
         case Figure1():
-            return Facts(("grains drawn", "arrows"), [(str(len(data.grains)), str(len(data.profile.height)))])
+            return TextTable(("grains drawn", "arrows"), [(str(len(data.grains)), str(len(data.profile.height)))])
         case Curves():
             header = (data.key, "families", "Q at folds", "T at the onset of inversion", "T from", "T to")
-            return Facts(header, [row for name, found in data.curves.items() for row in _curve(str(name), found)])
+            return TextTable(header, [row for name, found in data.curves.items() for row in _curve(str(name), found)])
         case Figure3():
             rows = [_flow(name, flow) for name, flow in data.flows.items()]
             points = (point for branch in data.curve.branches for point in branch.special)
-            return Facts(_FLOW, [*rows, *(_flow(point.kind, point.flow) for point in points)])
+            return TextTable(_FLOW, [*rows, *(_flow(point.kind, point.flow) for point in points)])
         case Figure5():
             hottest = f"{data.largest_temperature:.8g}", f"{data.height_of_largest:.5g}"
             header = (*_FLOW, "largest T", "at the height")
-            return Facts(header, [(*_flow("productive", data.flow), *hottest)])
+            return TextTable(header, [(*_flow("productive", data.flow), *hottest)])
         case HotProfiles():
             header = (*_FLOW, "λ", *(f"distance in {field.replace('_', ' ')}" for field in FIELDS))
             distances = (f"{data.largest_distance(field):.2%}" for field in FIELDS)
-            return Facts(header, [(*_flow("hot", data.flow), f"{data.lambda_:.5g}", *distances)])
+            return TextTable(header, [(*_flow("hot", data.flow), f"{data.lambda_:.5g}", *distances)])
         case Figure11():
             rows = [(f"λ = {value:.5g}", f"{slope:.6g}") for value, slope in data.marks.items()]
-            return Facts(("where", "slope"), [*rows, ("δ = 0", f"{data.slope_of_divergence:.6g}")])
+            return TextTable(("where", "slope"), [*rows, ("δ = 0", f"{data.slope_of_divergence:.6g}")])
         case Figure14():
             header = ("e, e_w", "points", *(f"with a flow at T = {temperature:g}" for temperature in TEMPERATURES))
-            return Facts(
+            return TextTable(
                 header,
                 [
                     (f"{e}, {e_w}", str(len(found.exists)), *(str(int(count)) for count in found.exists.sum(axis=0)))
@@ -61,7 +61,7 @@ def facts(data: Any) -> Facts:
                 ],
             )
         case _:
-            return Facts(_FLOW, list(_flows(data.flows)))
+            return TextTable(_FLOW, list(_flows(data.flows)))
 
 
 def _flows(found: Mapping[Any, SteadyFlow]) -> Iterator[Row]:

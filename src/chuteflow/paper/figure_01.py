@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import Profile, flows
-from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.data import FigureTable, chute_note
 from chuteflow.paper.materials import dissipative
 from chuteflow.plotting import style
 
@@ -36,10 +36,10 @@ class Figure1:
     grains: Any
     profile: Profile
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """Grains and arrows."""
         kind = ["grain"] * len(self.grains) + ["velocity"] * len(ARROWS)
-        return Table(
+        return FigureTable(
             "Figure 1: sketch of the coordinates; x along the slope, z normal to it",
             (chute_note(dissipative(SLOPE)), "grains are for show; the velocity is that of the cold flow of figure 2"),
             {
@@ -56,9 +56,9 @@ def compute() -> Figure1:
     cold = flows(dissipative(SLOPE), Q=MASS_FLUX)[-1]
     random = np.random.default_rng(1)
     thrown = np.column_stack([random.uniform(0.0, LENGTH, GRAINS), random.uniform(0.5, HEIGHT, GRAINS)])
-    share = cold.profile(thrown[:, 1]).volume_fraction / cold.largest_volume_fraction
+    fraction = cold.profile(thrown[:, 1]).volume_fraction / cold.largest_volume_fraction
     kept: list[Any] = []
-    for place in thrown[random.uniform(0.0, 1.0, GRAINS) < share**1.5]:
+    for place in thrown[random.uniform(0.0, 1.0, GRAINS) < fraction**1.5]:
         if not kept or np.hypot(*(np.array(kept) - place).T).min() > NEAREST:
             kept.append(place)
     return Figure1(np.array(kept), cold.profile(ARROWS))
@@ -77,9 +77,9 @@ def draw(data: Figure1) -> Figure:
         ax.add_patch(Circle(tuple(_turned((place, -0.5))), 0.5, facecolor=style.GREY, edgecolor=style.GREY))
     _line(ax, (0.0, -1.0), (LENGTH, -1.0))
     foot = _turned((LENGTH, -1.0))
-    ax.plot([foot[0] - 8.5, foot[0]], [foot[1], foot[1]], **style.Stroke(style.BLACK, style.DASHED).line(0.8))
+    ax.plot([foot[0] - 8.5, foot[0]], [foot[1], foot[1]], **style.LineStyle(style.BLACK, style.DASHED).line(0.8))
     sweep = np.radians(np.linspace(180.0 - ANGLE, 180.0, 40))
-    ax.plot(foot[0] + 6.0 * np.cos(sweep), foot[1] + 6.0 * np.sin(sweep), **style.Stroke().line(0.8))
+    ax.plot(foot[0] + 6.0 * np.cos(sweep), foot[1] + 6.0 * np.sin(sweep), **style.LineStyle().line(0.8))
     style.write(ax, foot[0] - 7.4, foot[1] + 0.8, r"$\theta$", fontsize=11)
     _arrow(ax, (0.0, 0.0), (LENGTH + 4.0, 0.0), "$x$", (4.0, -4.0))
     _arrow(ax, (0.0, 0.0), (0.0, 7.5), "$z$", (4.0, -2.0))
@@ -89,7 +89,7 @@ def draw(data: Figure1) -> Figure:
         _arrow(ax, (ARROWS_AT, height), (end, height), "", (0.0, 0.0), style.VERMILION)
     _line(ax, (ARROWS_AT, 0.0), (ARROWS_AT, ARROWS[-1] + 0.4), style.VERMILION)
     x, y = _turned(np.column_stack([ends, ARROWS])).T
-    ax.plot(x, y, **style.Stroke(style.VERMILION).line(1.0))
+    ax.plot(x, y, **style.LineStyle(style.VERMILION).line(1.0))
     x, y = _turned((ends[-1], ARROWS[-1]))
     style.write(ax, x, y, "$u(z)$", xytext=(4.0, 2.0), color=style.VERMILION, fontsize=11)
     ax.set(xlim=(-1.5, LENGTH + 4.0), ylim=(foot[1] - 1.0, 8.0))
@@ -109,7 +109,7 @@ def _back(direction: Any) -> Any:
 
 def _line(ax: Axes, start: Any, end: Any, colour: str = style.BLACK) -> None:
     x, y = _turned(np.array([start, end])).T
-    ax.plot(x, y, **style.Stroke(colour).line(1.0))
+    ax.plot(x, y, **style.LineStyle(colour).line(1.0))
 
 
 def _arrow(ax: Axes, start: Any, end: Any, name: str, offset: tuple[float, float], colour: str = style.BLACK) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -26,9 +26,9 @@ FIELDS = ("volume_fraction", "granular_temperature", "velocity")
 #: The flows from hot to cold: how the caption calls and draws them.
 WORDS = {"A": "high temperature, dilute", "B": "mid-temperature", "C": "low temperature, dense"}
 STROKES = {
-    "A": style.Stroke(style.VERMILION, style.SOLID),
-    "B": style.Stroke(style.GREEN, style.DOTTED),
-    "C": style.Stroke(style.BLUE, style.DASHED),
+    "A": style.LineStyle(style.VERMILION, style.SOLID),
+    "B": style.LineStyle(style.GREEN, style.DOTTED),
+    "C": style.LineStyle(style.BLUE, style.DASHED),
 }
 #: Right ends of the panels.
 RIGHT = (0.4, 10.0, 10.0)
@@ -41,7 +41,7 @@ class Figure2:
     flows: dict[str, SteadyFlow]
     profiles: dict[str, Profile]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The profiles, one below the other."""
         notes = [
             f"{name}: T_surface = {flow.surface_temperature}, h = {flow.centre_of_mass}, "
@@ -56,7 +56,7 @@ class Figure2:
             },
         )
         title = f"Figure 2: profiles of the flows with mass flux {MASS_FLUX}"
-        return Table(title, (chute_note(dissipative(SLOPE)), *notes), columns)
+        return FigureTable(title, (chute_note(dissipative(SLOPE)), *notes), columns)
 
 
 def compute(source: Source = OVERBURDEN) -> Figure2:

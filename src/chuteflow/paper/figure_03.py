@@ -1,4 +1,4 @@
-"""Figure 3: centre of mass, mass hold-up and mass flux along the family of flows at tan(theta) = 0.3."""
+"""Figure 3: centre of mass, mass hold-up and mass flux along the branch of flows at tan(theta) = 0.3."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.branches.lines import NUMBERS, SteadyBranch, SteadyFlow, in_order
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, SURFACE_TEMPERATURE, Source, SteadyCurve, reach
 from chuteflow.plotting import style
@@ -35,7 +35,7 @@ class Figure3:
     curve: SteadyCurve
     flows: dict[str, SteadyFlow]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The branches and then the named flows, one below the other."""
         groups: dict[Any, dict[str, Any]] = {
             f"family {i}": _columns([point.flow for point in in_order(branch)])
@@ -49,13 +49,13 @@ class Figure3:
         ]
         ends = [f"family {i} ends: {', and '.join(branch.ends)}" for i, branch in enumerate(self.curve.branches, 1)]
         title = "Figure 3: centre of mass, mass hold-up and mass flux of all flows"
-        return Table(
+        return FigureTable(
             title, (chute_note(self.curve.chute), *reach(self.curve), *ends, *special), stacked("flows", groups)
         )
 
 
 def compute(source: Source = OVERBURDEN) -> Figure3:
-    """The family of flows, and its flows at Q = 3."""
+    """The branch of flows, and its flows at Q = 3."""
     chute = dissipative(SLOPE)
     (traced,) = source.curves([chute], SURFACE_TEMPERATURE, POINTS)
     return Figure3(traced, dict(zip("ABC", source.flows(chute, Q=MASS_FLUX), strict=True)))
@@ -66,7 +66,7 @@ def draw(data: Figure3) -> Figure:
     figure, axes = style.panels(3)
     for ax, (x, y, right, top, sides) in zip(axes, PANELS, strict=True):
         for branch in data.curve.branches:
-            ax.plot(*_line(branch, x, y), **style.Stroke().line())
+            ax.plot(*_line(branch, x, y), **style.LineStyle().line())
         for side, (name, flow) in zip(sides, data.flows.items(), strict=True):
             style.name_point(ax, getattr(flow, x), getattr(flow, y), name, side)
         style.name_axes(ax, style.label(x), style.label(y))

@@ -1,7 +1,7 @@
 """Figure 4: centre of mass against mass flux for slopes from 0.22 to 0.36.
 
 More is found than the paper says. On slopes from about 0.3365 on, the branch that runs to large mass flux as the
-temperature falls is not all: below a surface temperature of 0.02 there is a second family of dense flows, which come
+temperature falls is not all: below a surface temperature of 0.02 there is a second branch of dense flows, which come
 at mass fluxes below the minimum of the first as well. It is drawn, and named, for tan(theta) = 0.34.
 """
 

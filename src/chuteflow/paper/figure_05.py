@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import QUANTITIES, Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.data import FigureTable, chute_note
 from chuteflow.paper.materials import productive
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -35,7 +35,7 @@ class Figure5:
     largest_temperature: float
     height_of_largest: float
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The profile."""
         notes = (
             chute_note(self.flow.chute),
@@ -44,7 +44,7 @@ class Figure5:
             f"largest temperature {self.largest_temperature} at the height {self.height_of_largest}",
         )
         columns = {name: getattr(self.profile, name).tolist() for name in ("height", *FIELDS)}
-        return Table(f"Figure 5: profiles of the productive flow with mass flux {MASS_FLUX}", notes, columns)
+        return FigureTable(f"Figure 5: profiles of the productive flow with mass flux {MASS_FLUX}", notes, columns)
 
 
 def compute(source: Source = OVERBURDEN) -> Figure5:
@@ -62,7 +62,7 @@ def draw(data: Figure5) -> Figure:
     """Three panels, height upwards; the maximum of the temperature enlarged."""
     figure, axes = style.panels(3, shared_y=True)
     for ax, field, limits in zip(axes, FIELDS, LIMITS, strict=True):
-        ax.plot(getattr(data.profile, field), data.profile.height, **style.Stroke().line())
+        ax.plot(getattr(data.profile, field), data.profile.height, **style.LineStyle().line())
         style.name_axes(ax, style.label(field), style.label("height") if ax is axes[0] else None)
         ax.set_xlim(*limits)
         ax.set_ylim(0.0, TOP)
@@ -70,8 +70,8 @@ def draw(data: Figure5) -> Figure:
     far = data.flow.surface_temperature
     excess = data.largest_temperature - far
     small = style.inset(axes[1], (0.2, 0.3, 0.42, 0.55))
-    small.plot((data.profile.granular_temperature - far) / excess, data.profile.height, **style.Stroke().line())
-    small.axvline(0.0, **style.Stroke(style.GREY, style.DASHED).line(0.8))
+    small.plot((data.profile.granular_temperature - far) / excess, data.profile.height, **style.LineStyle().line())
+    small.axvline(0.0, **style.LineStyle(style.GREY, style.DASHED).line(0.8))
     small.plot([1.0], [data.height_of_largest], marker="o", markersize=3.0, color=style.BLACK)
     small.set(xlim=(-1.5, 1.5), ylim=(0.0, TOP), xticks=[0.0, 1.0], yticks=[0.0, TOP])
     small.set_xticklabels(["0", f"{1e4 * excess:.1f}"])

@@ -30,6 +30,6 @@ def draw(data: Curves) -> Figure:
         draw_densities(ax, found)
     frame(ax, RIGHT, TOP)
     name_slopes(ax, data, SLOPES, RIGHT, TOP)
-    ax.plot([], [], label="monotonic density", **style.Stroke(style.BLACK, style.OF_DENSITY["monotonic"]).line())
+    ax.plot([], [], label="monotonic density", **style.LineStyle(style.BLACK, style.OF_DENSITY["monotonic"]).line())
     style.legend(ax, loc="lower right")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -23,8 +23,8 @@ POINTS = 401
 #: The flows from hot to cold, with the right and upper end of their panels.
 FLOWS = {"high temperature": (0.06, 30.0), "mid-temperature": (0.2, 15.0), "low temperature": (0.4, 6.0)}
 LINES = {
-    "free": (style.Stroke(style.BLUE, style.SOLID), "asymptotic conditions"),
-    "interface": (style.Stroke(style.VERMILION, style.DASHED), "interface conditions"),
+    "free": (style.LineStyle(style.BLUE, style.SOLID), "asymptotic conditions"),
+    "interface": (style.LineStyle(style.VERMILION, style.DASHED), "interface conditions"),
 }
 
 
@@ -35,7 +35,7 @@ class Figure7:
     flows: dict[tuple[str, str], SteadyFlow]
     profiles: dict[tuple[str, str], Profile]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The profiles, one below the other, up to the interface where there is one."""
         notes = [
             f"{name}, {surface}: Q = {flow.mass_flux}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}, "
@@ -53,7 +53,7 @@ class Figure7:
         named = {"flow": [name for name, _ in keys], "surface": [surface for _, surface in keys]}
         title = f"Figure 7: volume fraction of the flows with mass flux {MASS_FLUX}, surface conditions compared"
         chutes = (chute_note(dissipative(SLOPE, surface)) for surface in LINES)
-        return Table(title, (*chutes, *notes), named | columns)
+        return FigureTable(title, (*chutes, *notes), named | columns)
 
 
 def compute(source: Source = OVERBURDEN) -> Figure7:

@@ -31,10 +31,10 @@ def draw(data: Curves) -> Figure:
     figure, (ax,) = style.panels(1, width=4.4, height=3.8)
     places = []
     for slope, found in data.curves.items():
-        draw_plain(ax, found, style.Stroke())
+        draw_plain(ax, found, style.LineStyle())
         places.append(hot_end(found.branches[0], 0.999 * WINDOW_H[1]))
         style.write(ax, places[-1], WINDOW_H[1], f"{slope:.2f}", xytext=(2.0, 3.0), rotation=60, rotation_mode="anchor")
-    ax.plot(LINE_Q, LINE_END * LINE_Q**2, **style.Stroke(style.VERMILION, style.DASHED).line())
+    ax.plot(LINE_Q, LINE_END * LINE_Q**2, **style.LineStyle(style.VERMILION, style.DASHED).line())
     style.write(ax, LINE_Q[0], LINE_END * LINE_Q[0] ** 2, r"$h \sim Q^2$", xytext=(-4.0, 0.0), ha="right")
     style.write(ax, min(places), WINDOW_H[1], r"slope $\tan\theta$", xytext=(-8.0, 8.0), ha="right")
     style.name_axes(ax, style.label("mass_flux"), style.label("centre_of_mass"))

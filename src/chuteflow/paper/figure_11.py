@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow import hot
-from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.data import FigureTable, chute_note
 from chuteflow.paper.materials import dissipative
 from chuteflow.plotting import style
 from chuteflow.theory.hot import LAMBDA_C, inversion_lambda, slope_at
@@ -34,10 +34,10 @@ class Figure11:
     slope_of_divergence: float
     marks: dict[float, float]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """Both curves."""
         notes = [f"lambda = {value} at slope {slope}" for value, slope in self.marks.items()]
-        return Table(
+        return FigureTable(
             "Figure 11: lambda and delta against slope",
             (chute_note(dissipative(0.3)), f"delta = 0 at slope {self.slope_of_divergence}", *notes),
             {"slope": self.slope.tolist(), "lambda": self.lambda_.tolist(), "delta": self.delta.tolist()},
@@ -65,7 +65,7 @@ def compute() -> Figure11:
 def draw(data: Figure11) -> Figure:
     """Two panels; lambda in two pieces, either side of where delta vanishes."""
     figure, axes = style.panels(2, height=3.0)
-    stroke, guide = style.Stroke(), style.Stroke(style.GREY, style.DOTTED)
+    stroke, guide = style.LineStyle(), style.LineStyle(style.GREY, style.DOTTED)
     for part in (data.delta > 0.0, data.delta < 0.0):
         axes[0].plot(data.slope[part], data.lambda_[part], **stroke.line())
     axes[1].plot(data.slope, data.delta, **stroke.line())

@@ -23,7 +23,7 @@ LIMITS = ((0.0, 0.01), (45.0, 65.0), (0.0, 35.0))
 
 
 def compute(source: Source = OVERBURDEN) -> HotProfiles:
-    """(4.21)-(4.23), with the misprint of (4.23) mended, and the flow."""
+    """(4.21)-(4.23), with the misprint of (4.23) corrected, and the flow."""
     chute, z = dissipative(SLOPE), np.linspace(0.0, TOP, POINTS)
     parameters = hot(chute).parameters
     fields = expansion(parameters.lambda_, np.exp(-z / TEMPERATURE), parameters.mu)

@@ -16,7 +16,7 @@ import numpy as np
 
 from chuteflow import QUANTITIES, Chute, hot
 from chuteflow.maps import exists_at
-from chuteflow.paper.data import Table
+from chuteflow.paper.data import FigureTable
 from chuteflow.plotting import style
 from chuteflow.theory.hot import LAMBDA_C, inversion_lambda, slope_at
 
@@ -33,18 +33,18 @@ HIGHEST_ROUGHNESS = float(np.sqrt(0.75))
 PRINTED_LAMBDA_C = 2.284
 #: Values of lambda with their strokes and words.
 CURVES = {
-    0.0: (style.Stroke(style.BLACK, style.SOLID), r"$\lambda = 0$"),
-    inversion_lambda(): (style.Stroke(style.GREEN, style.DOTTED), r"$\lambda = 0.660$, onset of inversion"),
-    PRINTED_LAMBDA_C: (style.Stroke(style.BLUE, style.DASHED), r"$\lambda = 2.284$, as printed"),
-    LAMBDA_C: (style.Stroke(style.VERMILION, style.SOLID), r"$\lambda = 3$, exact"),
+    0.0: (style.LineStyle(style.BLACK, style.SOLID), r"$\lambda = 0$"),
+    inversion_lambda(): (style.LineStyle(style.GREEN, style.DOTTED), r"$\lambda = 0.660$, onset of inversion"),
+    PRINTED_LAMBDA_C: (style.LineStyle(style.BLUE, style.DASHED), r"$\lambda = 2.284$, as printed"),
+    LAMBDA_C: (style.LineStyle(style.VERMILION, style.SOLID), r"$\lambda = 3$, exact"),
 }
-DELTA_STROKE = style.Stroke(style.PURPLE, style.DASH_DOTTED)
+DELTA_STROKE = style.LineStyle(style.PURPLE, style.DASH_DOTTED)
 #: Diameters of the rings, from cold to hot.
 RINGS = (1.3, 3.4, 5.6, 7.8)
 
 
 @dataclass(frozen=True, eq=False)
-class Domain:
+class DomainPanel:
     """One panel: points (slope, roughness) with ``exists`` (points, temperatures), and the curves of lambda.
 
     A curve is the slope (or nan) over ``roughness``; ``balance`` is the slope where delta = 0.
@@ -62,9 +62,9 @@ class Domain:
 class Figure14:
     """Both panels, by e and e_w."""
 
-    domains: dict[tuple[float, float], Domain]
+    domains: dict[tuple[float, float], DomainPanel]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The points of both panels, then their curves."""
         columns: dict[str, list[Any]] = {name: [] for name in ("e", "e_w", "kind", "slope", "roughness")}
         flags = {f"flow_at_T_inf_{temperature:g}": [] for temperature in TEMPERATURES}
@@ -85,7 +85,7 @@ class Figure14:
                 for flag, values in zip(flags.values(), exists.T, strict=True):
                     flag += ["" if value is None else int(value) for value in values[keep]]
         note = "1 where the full equations have a flow with a hold-up up to 30, 0 where they have none"
-        return Table("Figure 14: where flows exist", (note,), columns | flags)
+        return FigureTable("Figure 14: where flows exist", (note,), columns | flags)
 
 
 def compute() -> Figure14:
@@ -93,7 +93,7 @@ def compute() -> Figure14:
     return Figure14({material: domain(*material, *slopes) for material, slopes in PANELS.items()})
 
 
-def domain(e: float, e_w: float, lowest: float, highest: float) -> Domain:
+def domain(e: float, e_w: float, lowest: float, highest: float) -> DomainPanel:
     """Points and curves for one material, for slopes from ``lowest`` to ``highest``."""
     slopes = np.arange(lowest, highest + 1e-9, SLOPE_STEP)
     levels = np.arange(ROUGHNESS[0], ROUGHNESS[1] + 1e-9, ROUGHNESS_STEP)
@@ -103,7 +103,7 @@ def domain(e: float, e_w: float, lowest: float, highest: float) -> Domain:
     limit = hot(Chute(0.3, e, e_w, 0.6)).parameters.dilute
     curves = {value: _slopes([slope_at(limit, e_w, float(r), value) for r in roughness]) for value in CURVES}
     place = np.array(points)
-    return Domain(place[:, 0], place[:, 1], exists, roughness, curves, float(np.sqrt(limit.g20 * limit.g52)))
+    return DomainPanel(place[:, 0], place[:, 1], exists, roughness, curves, float(np.sqrt(limit.g20 * limit.g52)))
 
 
 def _slopes(found: list[float | None]) -> Any:
@@ -130,7 +130,7 @@ def _corner(e: float, e_w: float) -> tuple[float, float]:
     return PANELS[e, e_w][0] + 0.01, ROUGHNESS[1] + 0.006
 
 
-def _points(ax: Axes, found: Domain) -> None:
+def _points(ax: Axes, found: DomainPanel) -> None:
     for index, (temperature, size) in enumerate(zip(TEMPERATURES, RINGS, strict=True)):
         there = found.exists[:, index]
         ax.plot(

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -28,8 +28,8 @@ FLOWS = {
     "low temperature": (6.0, ((0.0, 0.4), (0.0, 1.0), (0.0, 5.0))),
 }
 LINES = {
-    "lun": (style.Stroke(style.BLUE, style.SOLID), "modified Fourier"),
-    "lun-fourier": (style.Stroke(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
+    "lun": (style.LineStyle(style.BLUE, style.SOLID), "modified Fourier"),
+    "lun-fourier": (style.LineStyle(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
 }
 
 
@@ -40,7 +40,7 @@ class Figure15:
     flows: dict[tuple[str, str], SteadyFlow]
     profiles: dict[tuple[str, str], Profile]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The profiles, one below the other."""
         notes = [
             f"{name}, {closure}: T_inf = {flow.surface_temperature}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}"
@@ -57,7 +57,7 @@ class Figure15:
         named = {"flow": [name for name, _ in keys], "closure": [closure for _, closure in keys]}
         title = f"Figure 15: profiles of the flows with mass flux {MASS_FLUX}, forms of the heat flux compared"
         chutes = (chute_note(dissipative(SLOPE, closure=closure)) for closure in LINES)
-        return Table(title, (*chutes, *notes), named | columns)
+        return FigureTable(title, (*chutes, *notes), named | columns)
 
 
 def compute(source: Source = OVERBURDEN) -> Figure15:

@@ -13,7 +13,7 @@ import numpy as np
 
 from chuteflow import Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stacked
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -28,10 +28,14 @@ POINTS = 401
 FLOWS = {"high temperature": 30.0, "mid-temperature": 15.0, "low temperature": 6.0}
 #: Parts of the upward heat flux, with the signs by which they become the terms of the caption.
 LINES = {
-    "conductive_heat_flux": (-1.0, style.Stroke(style.BLUE, style.SOLID), r"$g_3\,T^{1/2}\,\mathrm{d}T/\mathrm{d}z$"),
+    "conductive_heat_flux": (
+        -1.0,
+        style.LineStyle(style.BLUE, style.SOLID),
+        r"$g_3\,T^{1/2}\,\mathrm{d}T/\mathrm{d}z$",
+    ),
     "density_heat_flux": (
         1.0,
-        style.Stroke(style.VERMILION, style.DASHED),
+        style.LineStyle(style.VERMILION, style.DASHED),
         r"$g_4\,T^{3/2}\,\mathrm{d}\nu/\mathrm{d}z$",
     ),
 }
@@ -44,7 +48,7 @@ class Figure16:
     flows: dict[str, SteadyFlow]
     profiles: dict[str, Profile]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """The upward heat flux and its parts, the conductive one with the other sign than drawn."""
         columns = stacked(
             "flow",
@@ -54,7 +58,7 @@ class Figure16:
             },
         )
         title = f"Figure 16: upward heat flux and its parts in the flows with mass flux {MASS_FLUX}"
-        return Table(title, (chute_note(dissipative(SLOPE)),), columns)
+        return FigureTable(title, (chute_note(dissipative(SLOPE)),), columns)
 
 
 def compute(source: Source = OVERBURDEN) -> Figure16:

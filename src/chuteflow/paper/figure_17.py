@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chuteflow.paper.curves import Curves, draw_plain, frame, trace
+from chuteflow.paper.curves import Curves, draw_two, trace
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 SLOPE = 0.3
 #: Strokes and words of the two curves.
 LINES = {
-    "lun": (style.Stroke(style.BLUE, style.SOLID), "modified Fourier"),
-    "lun-fourier": (style.Stroke(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
+    "lun": (style.LineStyle(style.BLUE, style.SOLID), "modified Fourier"),
+    "lun-fourier": (style.LineStyle(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
 }
 #: Where the panel ends in Q and h.
 RIGHT, TOP = 6.0, 15.0
@@ -30,9 +30,4 @@ def compute(source: Source = OVERBURDEN) -> Curves:
 
 def draw(data: Curves) -> Figure:
     """One panel."""
-    figure, (ax,) = style.panels(1, width=3.8, height=3.2)
-    for name, found in data.curves.items():
-        draw_plain(ax, found, *LINES[name])
-    frame(ax, RIGHT, TOP)
-    style.legend(ax, loc="center right")
-    return figure
+    return draw_two(data, LINES, RIGHT, TOP)

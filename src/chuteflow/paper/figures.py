@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FIGURES = {
     1: "The coordinates",
     2: "Profiles of the three flows at mass flux 3",
-    3: "Centre of mass, mass hold-up and mass flux along the family of flows",
+    3: "Centre of mass, mass hold-up and mass flux along the branch of flows",
     4: "Centre of mass against mass flux over slopes",
     5: "Profiles of a productive flow",
     6: "Centre of mass against mass flux of productive flows",

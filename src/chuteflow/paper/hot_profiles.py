@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import Profile, hot
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import Table, chute_note
+from chuteflow.paper.data import FigureTable, chute_note
 from chuteflow.paper.sources import Source
 from chuteflow.plotting import style
 from chuteflow.theory.hot import HotParameters
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from chuteflow import Chute
 
 FIELDS = ("volume_fraction", "granular_temperature", "velocity")
-FULL = style.Stroke(style.BLUE, style.SOLID)
-REDUCED = style.Stroke(style.VERMILION, style.DASHED)
+FULL = style.LineStyle(style.BLUE, style.SOLID)
+REDUCED = style.LineStyle(style.VERMILION, style.DASHED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +34,14 @@ class HotProfiles:
     profile: Profile
     reduced: dict[str, Any]
 
-    def table(self) -> Table:
+    def table(self) -> FigureTable:
         """Both profiles side by side."""
         columns = {"height": self.profile.height.tolist()}
         for name in FIELDS:
             columns[name] = getattr(self.profile, name).tolist()
             columns[f"{name}_reduced"] = self.reduced[name].tolist()
         notes = (chute_note(self.flow.chute), f"T_inf = {self.flow.surface_temperature}, lambda = {self.lambda_}")
-        return Table(self.title, notes, columns)
+        return FigureTable(self.title, notes, columns)
 
     def largest_distance(self, field: str) -> float:
         """Largest difference of the two over the largest value of the full equations."""

@@ -17,8 +17,8 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from chuteflow import __version__
-from chuteflow.paper.claims import VERDICTS, Verdict, shown
-from chuteflow.paper.facts import Facts
+from chuteflow.paper.claims import VERDICTS, ClaimResult, shown
+from chuteflow.paper.facts import TextTable
 from chuteflow.plotting import style
 
 if TYPE_CHECKING:
@@ -33,14 +33,14 @@ _PAPER = (
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownFigure:
     """A figure on the page: ``picture`` is a data address, ``notes`` are the lines above the data in the files."""
 
     number: int
     title: str
     caption: str
     picture: str
-    facts: Facts
+    facts: TextTable
     notes: tuple[str, ...]
 
 
@@ -48,8 +48,8 @@ class Shown:
 class Report:
     """All that is on the page; ``seconds`` is the time it took."""
 
-    figures: Sequence[Shown]
-    verdicts: Sequence[Verdict]
+    figures: Sequence[ShownFigure]
+    verdicts: Sequence[ClaimResult]
     method: str
     started: datetime
     seconds: float
@@ -124,7 +124,7 @@ def _summary(report: Report) -> str:
     return _section("summary", "Summary", "".join(lines))
 
 
-def _claims(verdicts: Sequence[Verdict]) -> str:
+def _claims(verdicts: Sequence[ClaimResult]) -> str:
     """The table, with buttons above that show the rows of one verdict: by style alone."""
     buttons = "".join(
         f'<input type="radio" name="shown" id="show-{_class(name)}"{" checked" if name == "all" else ""}>'
@@ -145,7 +145,7 @@ def _claims(verdicts: Sequence[Verdict]) -> str:
     return _section("claims", "Claims", f'<div class="filtered">{chooser}</div>')
 
 
-def _claim(found: Verdict, header: Sequence[str]) -> str:
+def _claim(found: ClaimResult, header: Sequence[str]) -> str:
     texts = (found.source, shown(found.printed), shown(found.computed), found.verdict, found.reason)
     cells = "".join(
         f'<td data-label="{name}">{f"<span>{escape(text)}</span>" if name == "Verdict" else escape(text)}</td>'
@@ -157,11 +157,11 @@ def _claim(found: Verdict, header: Sequence[str]) -> str:
     return f'<tr class="{_class(found.verdict)}">{statement}{cells}</tr>'
 
 
-def _figures(shown_figures: Iterable[Shown]) -> str:
+def _figures(shown_figures: Iterable[ShownFigure]) -> str:
     return _section("figures", "Figures", "".join(map(_figure, shown_figures)))
 
 
-def _figure(found: Shown) -> str:
+def _figure(found: ShownFigure) -> str:
     name = f"Figure {found.number}"
     title = f"{name}. {found.title}"
     image = f'<img src="{found.picture}" alt="{escape(f"{name}: {found.caption}")}">'

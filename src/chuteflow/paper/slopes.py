@@ -34,18 +34,18 @@ def draw(data: Curves) -> Figure:
         for slope in slopes:
             draw_densities(ax, data.curves[slope])
             for branch in data.curves[slope].branches[1:]:
-                _name_cold_family(ax, slope, branch, right, top)
+                _name_cold_branch(ax, slope, branch, right, top)
         frame(ax, right, top)
         name_slopes(ax, data, slopes, right, top)
     for density, words in (("inverted", "density inversion"), ("monotonic", "monotonic density")):
-        axes[0].plot([], [], label=words, **style.Stroke(style.BLACK, style.OF_DENSITY[density]).line())
+        axes[0].plot([], [], label=words, **style.LineStyle(style.BLACK, style.OF_DENSITY[density]).line())
     style.legend(axes[0], loc="center right")
     return figure
 
 
-def _name_cold_family(ax: Axes, slope: float, branch: SteadyBranch, right: float, top: float) -> None:
+def _name_cold_branch(ax: Axes, slope: float, branch: SteadyBranch, right: float, top: float) -> None:
     flow = min(branch.flows, key=lambda flow: abs(flow.mass_flux - 0.8 * right))
-    words = f"{slope:.2f}, a second family, surface $T \\leq {branch.surface_temperature.max():.2g}$"
+    words = f"{slope:.2f}, a second branch, surface $T \\leq {branch.surface_temperature.max():.2g}$"
     arrow = {"arrowstyle": "-", "linewidth": 0.6, "shrinkB": 0.0}
     style.write(
         ax,

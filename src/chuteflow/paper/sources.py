@@ -1,7 +1,7 @@
 """Where the flows of the figures come from: the overburden method, or the paper's own mapped Chebyshev method.
 
 A figure asks its source for flows and curves, and knows nothing of the method. Newton's method needs a start: the
-mapped method begins each family from a flow of the other, solves it again, and follows the family by itself.
+mapped method begins each branch from a flow of the other, solves it again, and follows the branch by itself.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from chuteflow.steady.solver import Condition
 
 #: Surface temperatures of curves, and flows on the longest branch of the overburden method.
 SURFACE_TEMPERATURE, POINTS = (1e-3, 1e4), 400
-#: The mapped method begins a family nearest to this surface temperature, where few coefficients suffice.
+#: The mapped method begins a branch nearest to this surface temperature, where few coefficients suffice.
 _EASY = 1.0
 #: Steps that draw as smooth lines; the flows are solved again more closely than the points of the trace.
 _SMOOTH = replace(CONTROL, max_step=0.06, tolerance=1e-5)
-#: Flows that tell one family from another.
+#: Flows that tell one branch from another.
 _FEW = 24
 
 
 @dataclass(frozen=True)
-class Unreached:
-    """A family that the mapped method does not reach: its surface temperatures, lowest and highest, and why."""
+class UnreachedBranch:
+    """A branch that the mapped method does not reach: its surface temperatures, lowest and highest, and why."""
 
     surface_temperature: tuple[float, float]
     reason: str
@@ -38,13 +38,13 @@ class Unreached:
 
 @dataclass(frozen=True, eq=False)
 class MappedCurves:
-    """The families of a chute in a range of surface temperatures as far as the mapped method reaches, and those that
+    """The branches of a chute in a range of surface temperatures as far as the mapped method reaches, and those that
     it does not."""
 
     chute: Chute
     surface_temperature: tuple[float, float]
     branches: tuple[MappedCurve, ...]
-    unreached: tuple[Unreached, ...]
+    unreached: tuple[UnreachedBranch, ...]
 
 
 #: What figures draw.
@@ -73,7 +73,7 @@ class Source(Protocol):
         surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
         points: int = POINTS,
     ) -> Sequence[SteadyCurve]:
-        """The families of each of ``chutes``, as far as the method reaches, in a range of surface temperatures."""
+        """The branches of each of ``chutes``, as far as the method reaches, in a range of surface temperatures."""
         ...
 
 
@@ -139,9 +139,9 @@ class Mapped:
         if self.workers > 1 and len(new) > 1:
             found = _shared_out(self.workers, new, ranges)
         else:
-            found = map(mapped_families, new, ranges)
-        for chute, families in zip(new, found, strict=True):
-            self._known[chute, surface_temperature] = families
+            found = map(mapped_branches, new, ranges)
+        for chute, branches in zip(new, found, strict=True):
+            self._known[chute, surface_temperature] = branches
         return [self._known[chute, surface_temperature] for chute in chutes]
 
 
@@ -153,8 +153,8 @@ def source(method: str, workers: int = 1) -> Source:
     return {"overburden": OVERBURDEN, "mapped": Mapped(workers)}[method]
 
 
-def mapped_families(chute: Chute, surface_temperature: tuple[float, float]) -> MappedCurves:
-    """Every family of ``chute``, begun where the mapped method finds it easiest."""
+def mapped_branches(chute: Chute, surface_temperature: tuple[float, float]) -> MappedCurves:
+    """Every branch of ``chute``, begun where the mapped method finds it easiest."""
     low, high = surface_temperature
     reached, unreached = [], []
     for branch in curve(chute, surface_temperature=surface_temperature, points=_FEW).branches:
@@ -165,14 +165,14 @@ def mapped_families(chute: Chute, surface_temperature: tuple[float, float]) -> M
             reached.append(found)
         else:
             ends = float(branch.surface_temperature.min()), float(branch.surface_temperature.max())
-            unreached.append(Unreached(ends, f"the series do not converge with up to N = {LARGEST_DEGREE}"))
+            unreached.append(UnreachedBranch(ends, f"the series do not converge with up to N = {LARGEST_DEGREE}"))
     return MappedCurves(chute, surface_temperature, tuple(reached), tuple(unreached))
 
 
 def _shared_out(workers: int, chutes: Sequence[Chute], ranges: Sequence[tuple[float, float]]) -> Sequence[MappedCurves]:
-    """:func:`mapped_families` in processes of their own."""
+    """:func:`mapped_branches` in processes of their own."""
     with worker_pool(min(workers, len(chutes))) as pool:
-        return list(pool.map(mapped_families, chutes, ranges))
+        return list(pool.map(mapped_branches, chutes, ranges))
 
 
 #: How notes begin on flows that a method does not reach.
@@ -185,15 +185,15 @@ def reach(found: SteadyCurve) -> list[str]:
         return ["all flows with surface temperatures from {} to {}".format(*found.searched.surface_temperature)]
     low, high = found.surface_temperature
     cut = [
-        f"{NOT_REACHED}: what lies beyond the surface temperature {temperature:g} on a family: {end}"
+        f"{NOT_REACHED}: what lies beyond the surface temperature {temperature:g} on a branch: {end}"
         for branch in found.branches
         for temperature, end in zip(branch.surface_temperature[[0, -1]], branch.ends, strict=True)
         if low < temperature < high
     ]
     lost = [
-        "{}: a family with surface temperatures from {:g} to {:g}: {}".format(
-            NOT_REACHED, *family.surface_temperature, family.reason
+        "{}: a branch with surface temperatures from {:g} to {:g}: {}".format(
+            NOT_REACHED, *branch.surface_temperature, branch.reason
         )
-        for family in found.unreached
+        for branch in found.unreached
     ]
     return cut + lost

@@ -22,10 +22,10 @@ from chuteflow.plotting.hot_plot import plot_hot
 from chuteflow.plotting.relaxation_plot import plot_relaxation
 from chuteflow.plotting.scan_plot import plot_scan, plot_sets
 from chuteflow.plotting.stability_plot import plot_modes
-from chuteflow.stability.answers import Answer
+from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.stability.planes import FamilyMap, WaveMap
 from chuteflow.stability.relaxation import Relaxation
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.hot import HotModel
 from chuteflow.steady.quantities import Scales
@@ -133,7 +133,7 @@ def _family(result: FamilyMap, scales: Scales | None) -> Figure:
 @drawn.register(Stability)
 def _stability(result: Stability, scales: Scales | None) -> Figure:
     modes = () if result.mode is None else (result.mode,)
-    return plot_modes(_alone(result.flow), [Answer(result.flow, result, modes, None)], scales=scales)
+    return plot_modes(_alone(result.flow), [StabilityAnswer(result.flow, result, modes, None)], scales=scales)
 
 
 @drawn.register(HotModel)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.bifurcations.boundary import Boundary, BoundarySet
-from chuteflow.bifurcations.diagram import Diagram, Region, Sides
+from chuteflow.bifurcations.diagram import CountedRegion, Diagram, KindsBeside
 from chuteflow.bifurcations.tracing import TURNS
 from chuteflow.branches.results import KINDS
 from chuteflow.io.contract import factor
@@ -29,7 +29,7 @@ _MARKERS = {"cusp": "*", "birth": "o", "crossing": "X", "turn": "s"}
 _BESIDE = 11.0
 #: Entries of the legend that are longer stand below one another.
 _LONG = 45
-_LIMIT = style.Stroke(style.GREY, style.DOTTED)
+_LIMIT = style.LineStyle(style.GREY, style.DOTTED)
 
 
 @style.own_settings()
@@ -82,7 +82,7 @@ def _along(boundary: Boundary, quantity: str, scales: Scales | None) -> Array:
     return np.array([getattr(flow, quantity) * factor(quantity, flow.chute, scales) for flow in boundary.flows])
 
 
-def _at(found: BoundarySet, region: Region, quantity: str, scales: Scales | None) -> float:
+def _at(found: BoundarySet, region: CountedRegion, quantity: str, scales: Scales | None) -> float:
     return region.value * factor(quantity, replace(found.chute, **{found.second: region.parameter}), scales)
 
 
@@ -110,7 +110,7 @@ def plot_none(found: BoundarySet) -> Figure:
     return style.sentence(f"No boundary: {found.reason}.")
 
 
-def _name_sides(ax: Axes, beside: Sides, quantity: str, scales: Scales | None) -> None:
+def _name_sides(ax: Axes, beside: KindsBeside, quantity: str, scales: Scales | None) -> None:
     """Write the kinds of flows to both sides of a boundary."""
     boundary, index = beside.boundary, beside.index
     values = _along(boundary, quantity, scales)

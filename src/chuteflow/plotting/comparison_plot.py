@@ -22,8 +22,8 @@ _RATIOS = {
     "g2": r"$-P_{xz}/(g_2\sqrt{T}\,u')$",
     "g5": r"$\gamma/(g_5 T^{3/2})$",
 }
-#: Measured layers are shown with this share of the mass above them, or more, and with this part of the largest volume
-#: fraction, or more, near the base: others hold hardly a grain.
+#: Measured layers are shown with this fraction of the mass above them, or more, and with this part of the largest
+#: volume fraction, or more, near the base: others hold hardly a grain.
 _HIGHEST, _EMPTY = 0.02, 0.02
 #: Errors shown by a band, and points of a line of the theory.
 _BAND, _POINTS = 2.0, 161
@@ -54,7 +54,7 @@ def plot_comparison(found: Comparison) -> Figure:
     handles = {}
     for one in found.candidates:
         if one.condition == "M":
-            line = style.Stroke(style.stroke(closures.index(one.closure)).colour, _DASHES[one.mapping]).line()
+            line = style.LineStyle(style.stroke(closures.index(one.closure)).colour, _DASHES[one.mapping]).line()
             profile = one.flow.at_overburden(at)
             for ax, name in zip(axes[:3], _FIELDS, strict=True):
                 (drawn,) = ax.plot(getattr(profile, name), at, **line)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.maps import Boundary, Domain
+from chuteflow.maps import Domain, Outline
 from chuteflow.parameters import PARAMETERS
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
@@ -26,24 +26,24 @@ _DENSITIES = {0: "#ffffff", 1: "#fbe9c6", 3: "#f1c27b", 2: "#d99a5b"}
 _DENSITY_WORDS = {1: "monotonic", 3: "monotonic and inverted", 2: "inverted"}
 #: Strokes and words of the kinds of boundaries, panel by panel.
 _OF_NUMBER = {
-    "F21=0": (style.Stroke(style.BLACK, style.SOLID), r"$F_{21} = 0$: hot flows end"),
-    "lambda=3": (style.Stroke(style.VERMILION, style.SOLID), r"$\lambda = 3$: hot flows end"),
-    "delta=0": (style.Stroke(style.PURPLE, style.DASH_DOTTED), r"$\delta = 0$: hot flows end"),
-    "existence": (style.Stroke(style.BLACK, style.DASHED), "first or last flow"),
-    "multiplicity": (style.Stroke(style.BLUE, style.SOLID), "another number of flows share one flux"),
+    "F21=0": (style.LineStyle(style.BLACK, style.SOLID), r"$F_{21} = 0$: hot flows end"),
+    "lambda=3": (style.LineStyle(style.VERMILION, style.SOLID), r"$\lambda = 3$: hot flows end"),
+    "delta=0": (style.LineStyle(style.PURPLE, style.DASH_DOTTED), r"$\delta = 0$: hot flows end"),
+    "existence": (style.LineStyle(style.BLACK, style.DASHED), "first or last flow"),
+    "multiplicity": (style.LineStyle(style.BLUE, style.SOLID), "another number of flows share one flux"),
 }
 _OF_KIND = {
-    "existence": (style.Stroke(style.BLACK, style.DASHED), "first or last flow"),
-    "inverted": (style.Stroke(style.GREEN, style.SOLID), "first or last inverted density"),
-    "monotonic": (style.Stroke(style.GREEN, style.DASHED), "first or last monotonic density"),
-    "lambda=0.660": (style.Stroke(style.GREEN, style.DOTTED), r"$\lambda = 0.660$: hot flows turn inverted"),
-    "mixed": (style.Stroke(style.PURPLE, style.SOLID), "first or last mixed interior"),
-    "productive": (style.Stroke(style.PURPLE, style.DASHED), "first or last productive interior"),
-    "dissipative": (style.Stroke(style.PURPLE, style.DASH_DOTTED), "first or last dissipative interior"),
+    "existence": (style.LineStyle(style.BLACK, style.DASHED), "first or last flow"),
+    "inverted": (style.LineStyle(style.GREEN, style.SOLID), "first or last inverted density"),
+    "monotonic": (style.LineStyle(style.GREEN, style.DASHED), "first or last monotonic density"),
+    "lambda=0.660": (style.LineStyle(style.GREEN, style.DOTTED), r"$\lambda = 0.660$: hot flows turn inverted"),
+    "mixed": (style.LineStyle(style.PURPLE, style.SOLID), "first or last mixed interior"),
+    "productive": (style.LineStyle(style.PURPLE, style.DASHED), "first or last productive interior"),
+    "dissipative": (style.LineStyle(style.PURPLE, style.DASH_DOTTED), "first or last dissipative interior"),
 }
 #: Strokes of surface temperatures, in turn.
 _TEMPERATURES = tuple(
-    style.Stroke(colour, dashes)
+    style.LineStyle(colour, dashes)
     for colour, dashes in (
         (style.BLUE, style.DOTTED),
         (style.BLUE, style.DASHED),
@@ -53,17 +53,17 @@ _TEMPERATURES = tuple(
         (style.VERMILION, style.SOLID),
     )
 )
-#: A region gets a label where a circle of this share of the axes fits into it.
+#: A region gets a label where a circle of this fraction of the axes fits into it.
 _ROOM = 0.035
-#: Side of the raster on which that is looked for.
+#: Side of the raster on which that is searched for.
 _RASTER = 160
 _LINE = 1.1
 
 
 @style.own_settings()
 def plot_domain(found: Domain) -> Figure:
-    """Two panels: how many flows share one flux, with the bounds of hot flows and hidden families hatched; and the
-    kinds of density and interior, with the bounds of flows at the temperatures asked for."""
+    """Two panels: how many flows share one flux, with the bounds of hot flows and hidden branches hatched; and the
+    kinds of density and interior, with the bounds of flows at the requested temperatures."""
     figure, axes = style.panels(2, width=7.6, height=4.7)
     _number_panel(axes[0], found)
     _kind_panel(axes[1], found)
@@ -106,7 +106,7 @@ def _kind_panel(ax: Axes, found: Domain) -> None:
     _label(ax, found, found.density, {0: "no flow"} | _DENSITY_WORDS)
 
 
-def _strokes(found: Domain) -> list[style.Stroke]:
+def _strokes(found: Domain) -> list[style.LineStyle]:
     return [_TEMPERATURES[i % len(_TEMPERATURES)] for i in range(len(found.plane.temperatures))]
 
 
@@ -134,7 +134,7 @@ def _hatch(ax: Axes, polygons: Sequence[NDArray[np.float64]]) -> None:
         )
 
 
-def _draw(ax: Axes, lines: Sequence[Boundary], strokes: dict[str, tuple[style.Stroke, str]]) -> None:
+def _draw(ax: Axes, lines: Sequence[Outline], strokes: dict[str, tuple[style.LineStyle, str]]) -> None:
     for one in lines:
         if one.kind in strokes:
             # The bounds in closed form stand above what begins or ends there.
@@ -170,7 +170,7 @@ def _label(ax: Axes, found: Domain, values: NDArray[Any], words: dict[int, str])
 
 
 def _key(found: Domain) -> Iterator[Any]:
-    """Entries of the legend: the lines that are there, temperatures, and hidden families."""
+    """Entries of the legend: the lines that are there, temperatures, and hidden branches."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -181,4 +181,4 @@ def _key(found: Domain) -> Iterator[Any]:
     for temperature, stroke in zip(found.plane.temperatures, _strokes(found), strict=True):
         yield Line2D([], [], label=rf"first or last flow at ${_TEMPERATURE} = {temperature:g}$", **stroke.line(_LINE))
     if found.hidden.any():
-        yield Patch(facecolor="none", edgecolor=style.BLACK, hatch="/////", linewidth=0.0, label="hidden families")
+        yield Patch(facecolor="none", edgecolor=style.BLACK, hatch="/////", linewidth=0.0, label="hidden branches")

@@ -1,4 +1,4 @@
-"""Pictures of growth rates: shades and contours over a plane of wavenumbers or along a family, with neutral curves."""
+"""Pictures of growth rates: shades and contours over a plane of wavenumbers or along a branch, with neutral curves."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
     from chuteflow.stability.planes import FamilyMap, WaveMap
 
-#: Shades of growth on either side of zero, and the largest decay that is told from the rest, over the largest growth.
+#: Shades of growth on either side of zero, and the largest decay that is distinguished from the rest, over the largest
+#: growth.
 _SHADES, _DEEPEST = 8, 2.0
 #: First digits of round numbers, the roundest first; others are for axes with fewer ticks than these.
 _DIGITS, _ROUNDEST, _FEW = (1, 2, 5, 3, 7, 4, 6, 8, 9), (1, 2, 5), 3
-#: Smallest distance of ticks, as a share of the axis.
+#: Smallest distance of ticks, as a fraction of the axis.
 _APART = 0.08
 _MAP_OF_COLOURS = "RdBu_r"
-_NEUTRAL = style.Stroke(style.BLACK, style.SOLID)
+_NEUTRAL = style.LineStyle(style.BLACK, style.SOLID)
 
 
 @style.own_settings()
@@ -57,7 +58,7 @@ def plot_wave_map(found: WaveMap, *, scales: Scales | None = None) -> Figure:
 
 @style.own_settings()
 def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure:
-    """Growth over k h and the temperature along a family, and the family with its unstable stretch of k h."""
+    """Growth over k h and the temperature along a branch, and the branch with its unstable stretch of k h."""
     figure, (left, right) = style.panels(2, width=7.6, height=3.7)
     chute = found.flows[0].chute
     rate, heat, flux_scale = (factor(name, chute, scales) for name in ("growth", "surface_temperature", "mass_flux"))
@@ -77,7 +78,7 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
     style.spread_scale(right, "x", [[flux_scale * flow.mass_flux for flow in flows] for flows in found.neutral_flows])
     style.logarithmic(right, "y")
     if found.neutral:
-        style.legend(right)
+        style.legend(figure, handles=right.get_lines(), loc="outside lower center", ncols=4)
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
         found.angle, f"waves at {found.angle:g} degrees to the slope"
     )
@@ -86,11 +87,11 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
 
 
 def _along(scales: Scales | None) -> str:
-    return f"${NUMBERS['surface_temperature'].latex}${style.unit('surface_temperature', scales)} along the family"
+    return f"${NUMBERS['surface_temperature'].latex}${style.unit('surface_temperature', scales)} along the branch"
 
 
 def _round_places(place: Any, temperature: Any) -> dict[float, str]:
-    """Places along the family at which its surface temperature is a round number, and these numbers.
+    """Places along the branch at which its surface temperature is a round number, and these numbers.
 
     Powers of ten come before others, which stand where there is room, the last ones only while there are few.
     """
@@ -103,30 +104,31 @@ def _round_places(place: Any, temperature: Any) -> dict[float, str]:
             value = digit * 10.0**power
             above = np.log(temperature / value)
             for i in np.flatnonzero((above[:-1] < 0.0) != (above[1:] < 0.0)):
-                share = above[i] / (above[i] - above[i + 1])
-                at = float(place[i] + share * (place[i + 1] - place[i]))
+                fraction = above[i] / (above[i] - above[i + 1])
+                at = float(place[i] + fraction * (place[i + 1] - place[i]))
                 if all(abs(at - other) >= _APART for other in found):
                     found[at] = f"{value:g}"
     return found
 
 
 def _hatched(growth: Any) -> str:
-    return "" if np.isfinite(growth).all() else "; hatched: no mode told"
+    return "" if np.isfinite(growth).all() else "; hatched: no mode resolved"
 
 
 def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any, scales: Scales | None) -> None:
-    """Shades that are white at zero growth, hatches where no mode is told, and crosses where growth is not known."""
+    """Shades that are white at zero growth, hatches where no mode is resolved, and crosses where growth is not
+    known."""
     from matplotlib.patches import Rectangle
     from matplotlib.ticker import MaxNLocator
 
-    told = np.isfinite(growth)
-    if not told.all():
+    resolved = np.isfinite(growth)
+    if not resolved.all():
         unit = Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, zorder=0.0, facecolor="white")
         unit.set(hatch="////", edgecolor=style.GREY, linewidth=0.0)
         ax.add_patch(unit)
         for i, j in np.argwhere(unresolved):
             ax.plot(x[i], y[j], marker="x", markersize=4.0, color=style.GREY, clip_on=False, linestyle="none")
-    if not (told[1:, 1:] & told[:-1, 1:] & told[1:, :-1] & told[:-1, :-1]).any():
+    if not (resolved[1:, 1:] & resolved[:-1, 1:] & resolved[1:, :-1] & resolved[:-1, :-1]).any():
         return
     largest = float(np.nanmax(growth, initial=0.0)) or float(np.nanmax(np.abs(growth), initial=1e-12))
     shown = np.ma.masked_invalid(np.clip(growth, -_DEEPEST * largest, largest))

@@ -13,7 +13,7 @@ from chuteflow.steady.hot import HotModel
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Points from the base up, and the share of the overburden at the uppermost.
+#: Points from the base up, and the fraction of the overburden at the uppermost.
 _POINTS, _HIGHEST = 201, 1e-4
 
 

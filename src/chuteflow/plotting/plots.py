@@ -104,7 +104,8 @@ def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
             colour = _colour(i, curve)
             for run in runs(branch):
                 ax.plot(
-                    *line(run.flows, pair, curve, scales), **style.Stroke(colour, style.OF_DENSITY[run.density]).line()
+                    *line(run.flows, pair, curve, scales),
+                    **style.LineStyle(colour, style.OF_DENSITY[run.density]).line(),
                 )
         mark(ax, curve, pair, scales)
         for axis, name in zip("xy", pair, strict=True):
@@ -223,16 +224,16 @@ def marker(kind: str) -> dict[str, Any]:
 
 
 def _key(curve: Curve) -> Iterator[Any]:
-    """Entries of the legend: families if there are several, the kinds of density and of special points."""
+    """Entries of the legend: branches if there are several, the kinds of density and of special points."""
     from matplotlib.lines import Line2D
 
     if len(curve.branches) > 1:
         for i in range(len(curve.branches)):
-            yield Line2D([], [], label=f"family {i + 1}", **style.Stroke(_colour(i, curve)).line())
+            yield Line2D([], [], label=f"branch {i + 1}", **style.LineStyle(_colour(i, curve)).line())
     densities = {run.density for branch in curve.branches for run in runs(branch)}
     for density, dashes in style.OF_DENSITY.items():
         if density in densities:
-            yield Line2D([], [], label=f"density {density}", **style.Stroke(style.BLACK, dashes).line())
+            yield Line2D([], [], label=f"density {density}", **style.LineStyle(style.BLACK, dashes).line())
     yield from key_of_kinds(curve)
 
 

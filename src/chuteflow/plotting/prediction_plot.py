@@ -20,7 +20,7 @@ _SHADE = 0.25
 
 
 def plot_prediction(found: Prediction) -> Figure:
-    """First the curve with its band, folds and the flows asked for, then profiles of these."""
+    """First the curve with its band, folds and the requested flows, then profiles of these."""
     figure, axes = style.panels(4, width=10.0, height=2.9)
     ax = axes[0]
     for band in found.bands:
@@ -30,7 +30,7 @@ def plot_prediction(found: Prediction) -> Figure:
             color=style.BLUE, alpha=_SHADE, linewidth=0.0,
         )  # fmt: skip
         middle = np.exp(band.points)
-        ax.plot(middle[:, 0], middle[:, 1], **style.Stroke(style.BLUE).line())
+        ax.plot(middle[:, 0], middle[:, 1], **style.LineStyle(style.BLUE).line())
     for fold in found.folds:
         if fold.kind == "fold-Q":
             spread = fold.value * np.expm1(found.widths * fold.error * np.array([-1.0, 1.0]))

@@ -12,22 +12,24 @@ from chuteflow.plotting.plots import parameters
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.stability.relaxation import Moment, Outcome
+    from chuteflow.stability.relaxation import Outcome, RelaxationState
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
-#: The picture begins at this share of the whole time, on a logarithmic axis.
+#: The picture begins at this fraction of the whole time, on a logarithmic axis.
 _FIRST = 1e-5
 
 
 @style.own_settings()
-def plot_relaxation(flow: Flow, moments: Sequence[Moment], end: Outcome, *, scales: Scales | None = None) -> Figure:
+def plot_relaxation(
+    flow: Flow, moments: Sequence[RelaxationState], end: Outcome, *, scales: Scales | None = None
+) -> Figure:
     """Q, h and T at the base against the logarithm of time, and their values in the steady flows; in SI units where
     ``scales`` are given."""
     from matplotlib.lines import Line2D
 
     figure, axes = style.panels(3, height=3.1)
-    rest = style.Stroke(style.BLACK, style.DOTTED)
+    rest = style.LineStyle(style.BLACK, style.DOTTED)
     clock = factor("time", flow.chute, scales)
     later = [moment for moment in moments if moment.time > _FIRST * moments[-1].time]
     for ax, name in zip(axes, ("mass_flux", "centre_of_mass", "base_temperature"), strict=True):

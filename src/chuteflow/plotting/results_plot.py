@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.dem.comparison import COMPARED, FUNCTIONS
-from chuteflow.dem.results import Result
+from chuteflow.dem.results import StudyResult
 from chuteflow.plotting import style
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _PALE = 0.35
 
 
 @style.own_settings()
-def plot_results(results: Sequence[Result]) -> Figure:
+def plot_results(results: Sequence[StudyResult]) -> Figure:
     """Six panels: the functions of the first law over nu, slip and heat at the base, and the flux over T."""
     figure, axes = style.panels(3, 2, height=5.4)
     values = sorted({one.measured.restitution for one in results})
@@ -55,12 +55,12 @@ def plot_results(results: Sequence[Result]) -> Figure:
     return figure
 
 
-def _look(one: Result, colours: dict[float, str]) -> dict[str, Any]:
+def _look(one: StudyResult, colours: dict[float, str]) -> dict[str, Any]:
     colour = colours[one.measured.restitution]
     return {"color": colour, "markersize": 3.0, "linestyle": "none", "alpha": 1.0 if one.state == "steady" else _PALE}
 
 
-def _functions(axes: Sequence[Axes], one: Result, look: dict[str, Any]) -> None:
+def _functions(axes: Sequence[Axes], one: StudyResult, look: dict[str, Any]) -> None:
     law = one.comparison.functions[0]
     nu = one.measured.tenths["volume_fraction"][COMPARED]
     for ax, name in zip(axes, FUNCTIONS, strict=True):
@@ -68,7 +68,7 @@ def _functions(axes: Sequence[Axes], one: Result, look: dict[str, Any]) -> None:
             ax.plot(nu, law.ratios[name], marker="o", **look)
 
 
-def _base(axes: Sequence[Axes], one: Result, look: dict[str, Any]) -> None:
+def _base(axes: Sequence[Axes], one: StudyResult, look: dict[str, Any]) -> None:
     for found in one.comparison.functions[0].differences:
         kind, _, by = found.name.partition(", r by ")
         if kind in _PAIRS:
@@ -76,7 +76,7 @@ def _base(axes: Sequence[Axes], one: Result, look: dict[str, Any]) -> None:
             ax.plot([found.theory], [found.measured], marker=_MARKERS[by], fillstyle=_fill(by), **look)
 
 
-def _fluxes(ax: Axes, one: Result, look: dict[str, Any]) -> None:
+def _fluxes(ax: Axes, one: StudyResult, look: dict[str, Any]) -> None:
     closure = one.comparison.functions[0].closure
     temperature = one.measured.numbers.get("mean_temperature", np.nan)
     for by, marker in _MARKERS.items():
@@ -88,7 +88,7 @@ def _fill(by: str) -> Any:
     return "full" if by == "area" else "none"
 
 
-def _key(figure: Figure, results: Sequence[Result], colours: dict[float, str]) -> None:
+def _key(figure: Figure, results: Sequence[StudyResult], colours: dict[float, str]) -> None:
     from matplotlib.lines import Line2D
 
     plain: dict[str, Any] = {"linestyle": "none", "markersize": 4.0}

@@ -24,7 +24,7 @@ _SIZE = 3.5
 
 @style.own_settings()
 def plot_sets(found: FlowSets, quantity: str = "centre_of_mass", *, scales: Scales | None = None) -> Figure:
-    """A number of every flow against the values that were asked for, the kinds of density apart."""
+    """A number of every flow against the values that were requested, the kinds of density apart."""
     _require(quantity)
     figure, (ax,) = style.panels(1, width=4.6, height=3.4)
     asked = CONDITIONS[found.quantity].quantity

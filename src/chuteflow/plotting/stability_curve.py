@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 #: Strokes of the stretches of a curve: solid where stable, dashed where not, by the direction of what grows.
 _STROKES = {
-    STABLE: style.Stroke(style.BLACK, style.SOLID),
-    "along": style.Stroke(style.VERMILION, style.DASHED),
-    "across": style.Stroke(style.BLUE, style.DASHED),
-    "oblique": style.Stroke(style.GREEN, style.DASHED),
-    "uniform": style.Stroke(style.PURPLE, style.DASHED),
-    UNKNOWN: style.Stroke(style.GREY, style.DOTTED),
+    STABLE: style.LineStyle(style.BLACK, style.SOLID),
+    "along": style.LineStyle(style.VERMILION, style.DASHED),
+    "across": style.LineStyle(style.BLUE, style.DASHED),
+    "oblique": style.LineStyle(style.GREEN, style.DASHED),
+    "uniform": style.LineStyle(style.PURPLE, style.DASHED),
+    UNKNOWN: style.LineStyle(style.GREY, style.DOTTED),
 }
 _PANELS = (("mass_flux", "centre_of_mass"), ("mass_flux", "mass_holdup"))
 

@@ -12,7 +12,7 @@ from chuteflow.io import words
 from chuteflow.io.contract import factor
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import parameters
-from chuteflow.stability.answers import Answer
+from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
@@ -25,17 +25,19 @@ if TYPE_CHECKING:
 _NAMES = (r"$\nu'$", "$u'$", "$v'$", "$w'$", "$T'$")
 #: Phases of a section, arrows along and up, and shades of the density.
 _PHASES, _ARROWS, _SHADES = 97, (17, 13), 13
-#: Sizes below this share of the largest velocity are none.
+#: Where the axis of the moduli ends, which are at most 1: the legend is beyond.
+_ROOM = 1.62
+#: Sizes below this fraction of the largest velocity are none.
 _NOTHING = 1e-9
 
 
 @style.own_settings()
-def plot_modes(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
+def plot_modes(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Scales | None = None) -> Figure:
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
         reasons = [answer.reason for answer in answers if answer.reason]
-        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
+        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
     unit = style.unit("growth", scales)
     length, rate = (factor(name, flows.chute, scales) for name in ("height", "growth"))
     figure, axes = style.panels(2, len(drawn), width=7.2, height=0.5 + 2.7 * len(drawn))
@@ -57,14 +59,14 @@ def plot_modes(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | No
     return figure
 
 
-def plot_budgets(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | None = None) -> Figure:
+def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Scales | None = None) -> Figure:
     """The energy budget of the leading mode of each flow: bars of the terms, that add up to the growth rate."""
     from chuteflow.stability.budget import TERMS
 
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
         reasons = [answer.reason for answer in answers if answer.reason]
-        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is told'}.")
+        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
     figure, axes = style.panels(1, len(drawn), width=7.2, height=0.6 + 2.9 * len(drawn))
     names = list(TERMS)
     rate = factor("growth", flows.chute, scales)
@@ -84,7 +86,9 @@ def plot_budgets(flows: FlowSet, answers: Sequence[Answer], *, scales: Scales | 
             rates.sum(axis=1), places, linestyle="none", marker="|", markersize=11.0, color=style.BLACK, label="total"
         )
         ax.axvline(0.0, color=style.BLACK, linewidth=0.6)
-        ax.axvline(rate * budget.mode.growth, label="growth rate", **style.Stroke(style.BLACK, style.DOTTED).line(0.9))
+        ax.axvline(
+            rate * budget.mode.growth, label="growth rate", **style.LineStyle(style.BLACK, style.DOTTED).line(0.9)
+        )
         ax.set_yticks(places, names)
         style.name_axes(ax, f"rate of the energy of the mode, over twice the energy{style.unit('growth', scales)}", "")
         title = f"{words.among(answer.flow, flows)}: {budget.mode.kind}, growth {rate * budget.mode.growth:.3g}"
@@ -106,7 +110,10 @@ def _profiles(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | 
             ax.plot(values[shown] / size, length * height[shown], label=f"{name}, {size:.3g}", **style.stroke(i).line())
     ax.set_ylim(0.0, length * top)
     style.name_axes(ax, "modulus over its largest, as listed", style.label("height", scales))
-    style.legend(ax, loc="best", frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
+    # Beside the curves, which it would hide.
+    ax.set_xlim(-0.03, _ROOM)
+    ax.set_xticks(np.linspace(0.0, 1.0, 5))
+    style.legend(ax, loc="center right", handlelength=1.8, handletextpad=0.5)
 
 
 def _section(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:

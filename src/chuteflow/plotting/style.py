@@ -42,7 +42,7 @@ _WIDTH = 1.3
 
 
 @dataclass(frozen=True)
-class Stroke:
+class LineStyle:
     """Colour and dashes of a line."""
 
     colour: str = BLACK
@@ -62,12 +62,12 @@ class Stroke:
 
 #: Strokes of consecutive lines; the first three are those of figure 2.
 STROKES = (
-    Stroke(VERMILION, SOLID),
-    Stroke(GREEN, DOTTED),
-    Stroke(BLUE, DASHED),
-    Stroke(PURPLE, DASH_DOTTED),
-    Stroke(BLACK, SOLID),
-    Stroke(GREY, DASHED),
+    LineStyle(VERMILION, SOLID),
+    LineStyle(GREEN, DOTTED),
+    LineStyle(BLUE, DASHED),
+    LineStyle(PURPLE, DASH_DOTTED),
+    LineStyle(BLACK, SOLID),
+    LineStyle(GREY, DASHED),
 )
 
 
@@ -154,7 +154,7 @@ def themed(figure: Figure, name: str) -> Figure:
     return figure
 
 
-def stroke(index: int) -> Stroke:
+def stroke(index: int) -> LineStyle:
     """The stroke of line ``index``, from the start again after the last."""
     return STROKES[index % len(STROKES)]
 
@@ -185,7 +185,7 @@ def title() -> dict[str, Any]:
 
 
 def inset(ax: Axes, place: tuple[float, float, float, float]) -> Axes:
-    """Small axes inside ``ax``: left, bottom, width and height as shares of it."""
+    """Small axes inside ``ax``: left, bottom, width and height as fractions of it."""
     small = ax.inset_axes(place)
     _calm(small)
     small.tick_params(labelsize=_SIZE - 2.0)

@@ -1,4 +1,4 @@
-"""Stability along a curve of flows: samples judged one by one, and the places where it changes.
+"""Stability along a curve of flows: examined flow by flow, and the places where it changes.
 
 Near the end of a stable range growth is slower than what counts as growth before it vanishes. There the neutral curve
 of the waves that begin to grow is followed to its extreme, and the end is that neutral point.
@@ -13,23 +13,24 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow import display
+from chuteflow.branches.paths import flow_between
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.checks import whole
 from chuteflow.errors import SolveError
-from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import smallest_rate
 from chuteflow.stability.neutral import End, neutral_curves
-from chuteflow.stability.planes import FamilyPlane, scanned
-from chuteflow.stability.verdict import RANGE, Stability, stability_of
+from chuteflow.stability.planes import FamilyPlane, scan_plane
+from chuteflow.stability.result import RANGE, Stability, stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
-#: Flows of a branch that are judged, unless told otherwise, and halvings of the gap in which stability changes.
+#: Flows of a branch that are examined by default, and halvings of the gap in which stability changes.
 SAMPLES, _HALVINGS = 24, 7
 _MOST_SAMPLES = 2000
-#: Growth, in units of what counts as growth, below which a neutral point is looked for; flows and points of its plane.
+#: Growth, in units of what counts as growth, below which a neutral point is searched for; flows and points of its
+#: plane.
 _SLOW, _MEMBERS, _PLANE = 30.0, 5, (7, 5)
-#: How far the plane reaches into the stable range, in brackets of the verdict.
+#: How far the plane reaches into the stable range, in brackets of the stability result.
 _REACHES = (3.0, 12.0, 64.0)
 #: The special point between a stable and an unstable flow.
 CHANGE = "stability-change"
@@ -39,7 +40,8 @@ STABLE, UNKNOWN = "stable", "unknown"
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A judged flow at a ``position`` along a branch, counted in its flows; ``found`` is None where no grid tells."""
+    """An examined flow at a ``position`` along a branch, counted in its flows; ``found`` is None where it is not
+    resolved."""
 
     position: float
     flow: Flow
@@ -59,14 +61,14 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class StabilityRun:
     """Neighbouring flows of a branch with one label; neighbouring runs share the flow where they meet."""
 
     label: str
     flows: tuple[Flow, ...]
 
     def __repr__(self) -> str:
-        return display.line("Run", self.label, display.counted(len(self.flows), "flow"))
+        return display.line("StabilityRun", self.label, display.counted(len(self.flows), "flow"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,7 @@ class Change:
     """Where stability changes: a ``flow`` at a ``position`` along a branch, with the ``error`` of its T_surface.
 
     If ``neutral``, it is the neutral point, where growth vanishes for the waves of the range searched. Else it is the
-    middle of the two flows between which the verdict changes, half of their distance the error.
+    middle of the two flows between which stability changes, half of their distance the error.
     """
 
     flow: Flow
@@ -89,12 +91,12 @@ class MarkedBranch:
 
     branch: Branch
     samples: tuple[Sample, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[StabilityRun, ...]
     changes: tuple[Change, ...]
 
     def __repr__(self) -> str:
         labels = ", ".join(run.label for run in self.runs)
-        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} judged: {labels}")
+        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} examined: {labels}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,20 +107,22 @@ class MarkedCurve:
     branches: tuple[MarkedBranch, ...]
 
     def __repr__(self) -> str:
-        judged = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
-        return display.line("MarkedCurve", f"{judged} judged", repr(self.curve)[1:-1])
+        examined = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        return display.line("MarkedCurve", f"{examined} examined", repr(self.curve)[1:-1])
 
 
 @on_one_thread
 @np.errstate(under="ignore")
-def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None) -> MarkedCurve:
+def mark_stability(
+    curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], None] | None = None
+) -> MarkedCurve:
     """The curve with its stability, about two seconds for each sample.
 
     Args:
-        curve: the families of flows of a chute.
-        samples: flows judged on each branch, evenly along it. A stretch that is shorter than their spacing can be
+        curve: the branches of flows of a chute.
+        samples: flows examined on each branch, evenly along it. A stretch that is shorter than their spacing can be
             missed.
-        progress: called with the share of the samples that is done.
+        progress: called with the fraction of the samples that is done.
 
     Raises:
         InputError: for a number of samples out of range, and where stability cannot be posed.
@@ -127,23 +131,23 @@ def marked(curve: Curve, *, samples: int = SAMPLES, progress: Callable[[float], 
     found = []
     for i, branch in enumerate(curve.branches):
 
-        def told(share: float, done: int = i) -> None:
+        def show_progress(fraction: float, done: int = i) -> None:
             if progress is not None:
-                progress((done + share) / len(curve.branches))
+                progress((done + fraction) / len(curve.branches))
 
-        found.append(_marked(branch, samples, told))
+        found.append(_marked(branch, samples, show_progress))
     return MarkedCurve(replace(curve, branches=tuple(one.branch for one in found)), tuple(found))
 
 
-def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> MarkedBranch:
+def _marked(branch: Branch, samples: int, show_progress: Callable[[float], None]) -> MarkedBranch:
     places = np.unique(np.linspace(0, len(branch.flows) - 1, min(samples, len(branch.flows))).round()).tolist()
-    judged: list[Sample] = []
+    examined: list[Sample] = []
     for place in places:
-        judged.append(_judged(branch, place))
-        told(len(judged) / len(places))
+        examined.append(_examine(branch, place))
+        show_progress(len(examined) / len(places))
     breaks: list[tuple[float, str]] = []
     changes: list[Change] = []
-    for one, two in pairwise(judged):
+    for one, two in pairwise(examined):
         if one.label == two.label:
             continue
         if UNKNOWN not in (one.label, two.label) and STABLE in (one.label, two.label):
@@ -154,11 +158,11 @@ def _marked(branch: Branch, samples: int, told: Callable[[float], None]) -> Mark
         breaks.append((place, two.label))
     points = [SpecialPoint(CHANGE, change.flow, int(change.position)) for change in changes]
     special = tuple(sorted([*branch.special, *points], key=lambda point: point.position))
-    runs = tuple(_runs(branch, judged[0].label, breaks))
-    return MarkedBranch(replace(branch, special=special), tuple(judged), runs, tuple(changes))
+    runs = tuple(_runs(branch, examined[0].label, breaks))
+    return MarkedBranch(replace(branch, special=special), tuple(examined), runs, tuple(changes))
 
 
-def _judged(branch: Branch, place: float) -> Sample:
+def _examine(branch: Branch, place: float) -> Sample:
     flow = flow_between(branch.flows, place)
     try:
         return Sample(place, flow, stability_of(flow))
@@ -171,7 +175,7 @@ def _change(branch: Branch, one: Sample, two: Sample) -> Change:
     stable, unstable = (one, two) if one.label == STABLE else (two, one)
     inner, outer = stable, unstable
     for _ in range(_HALVINGS):
-        middle = _judged(branch, 0.5 * (inner.position + outer.position))
+        middle = _examine(branch, 0.5 * (inner.position + outer.position))
         if middle.label == UNKNOWN:
             break
         if middle.label == STABLE:
@@ -208,22 +212,22 @@ def _neutral(branch: Branch, stable: float, outer: Sample) -> Change | None:
     low = float(np.log(RANGE[0]))
     plane = FamilyPlane(flows, float(np.arctan2(mode.ky, mode.kx)), low, float(np.log(max(3.0 * k, 0.1))) - low)
     extremes = []
-    for curve in neutral_curves(plane, scanned(plane, _PLANE)):
+    for curve in neutral_curves(plane, scan_plane(plane, _PLANE)):
         i = int(curve.z[:, 1].argmin())
         ended = {0: curve.ends[0], len(curve.z) - 1: curve.ends[1]}.get(i, End.EDGE)
         extremes.append((float(curve.z[i, 1]), float(curve.error[i]), ended is End.EDGE and curve.z[i, 1] > 0.0))
     if not extremes or not min(extremes)[2]:
         return None
-    share, error, _ = min(extremes)
+    fraction, error, _ = min(extremes)
     per_share = abs(flows[-1].surface_temperature - flows[0].surface_temperature)
-    place = stable + share * (outer.position - stable)
+    place = stable + fraction * (outer.position - stable)
     return Change(flow_between(branch.flows, place), place, error * per_share, neutral=True)
 
 
-def _runs(branch: Branch, label: str, breaks: Sequence[tuple[float, str]]) -> Iterator[Run]:
+def _runs(branch: Branch, label: str, breaks: Sequence[tuple[float, str]]) -> Iterator[StabilityRun]:
     """The flows of the branch cut at the positions of ``breaks``, each with the label after it."""
     begin = 0.0
     for end, after in (*breaks, (float(len(branch.flows) - 1), "")):
         inside = branch.flows[int(np.floor(begin)) + 1 : int(np.ceil(end))]
-        yield Run(label, (flow_between(branch.flows, begin), *inside, flow_between(branch.flows, end)))
+        yield StabilityRun(label, (flow_between(branch.flows, begin), *inside, flow_between(branch.flows, end)))
         begin, label = end, after

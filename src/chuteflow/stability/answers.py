@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.budget import ModeBudget, energy_budget
 from chuteflow.stability.modes import Mode
-from chuteflow.stability.verdict import Stability
+from chuteflow.stability.result import Stability
 from chuteflow.steady.flow import Flow
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class StabilityAnswer:
     """What is known of one flow: its stability and its leading modes, or in ``reason`` why it is not known."""
 
     flow: Flow
@@ -21,6 +21,6 @@ class Answer:
     reason: str | None
 
     @cached_property
-    def budget(self) -> Budget | None:
+    def budget(self) -> ModeBudget | None:
         """The energy budget of the leading mode, where there is one."""
         return energy_budget(self.modes[0]) if self.modes else None

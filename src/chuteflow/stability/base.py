@@ -1,6 +1,6 @@
 """A steady flow as the state that is disturbed: its fields and d/dz on a grid that reaches far above the grains.
 
-# notation: m = P/M share of the overburden, s grid coordinate (0 far above, 1 at the base), L reach.
+# notation: m = P/M fraction of the overburden, s grid coordinate (0 far above, 1 at the base), L reach.
 
 The grid runs in ln m, which is -z/T_inf far above, from m = exp(-L) to m = 1. A weight beta adds points near
 the base, where ln m is a poor measure of height: s is linear in ln m + beta m. The derivative is exact with
@@ -28,7 +28,7 @@ class Resolution:
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
+class BaseState:
     """A steady flow at the nodes of a grid, from far above down to the base, and d/dz there."""
 
     flow: Flow
@@ -49,13 +49,13 @@ class Base:
         return len(self.share)
 
 
-def base(flow: Flow, resolution: Resolution) -> Base:
+def base(flow: Flow, resolution: Resolution) -> BaseState:
     """``flow`` on the grid of ``resolution``; ``weights`` are those of integrals over the height."""
     g = grid(resolution.degree)
     share, rate = shares(g.nodes, resolution)
     profile = flow.at_overburden(share)
     fall = profile.volume_fraction / (flow.mass_holdup * rate)  # -ds/dz
-    return Base(
+    return BaseState(
         flow=flow,
         resolution=resolution,
         share=share,

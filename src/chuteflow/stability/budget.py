@@ -24,10 +24,10 @@ import numpy as np
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, exp
-from chuteflow.stability.base import Base
+from chuteflow.stability.base import BaseState
 from chuteflow.stability.linear import ACROSS, ALONG, DENSITY, HEAT, UP, grains
 from chuteflow.stability.modes import Mode, relative_fields
-from chuteflow.theory.transport import AXES, Fields, Grains, Motion, Vector, closures, motion, shear_rate
+from chuteflow.theory.transport import AXES, Fields, Material, Motion, Vector, closures, motion, shear_rate
 from chuteflow.threads import on_one_thread
 
 #: Names of the terms, and what they are.
@@ -62,7 +62,7 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
-class Budget:
+class ModeBudget:
     """The energy budget of ``mode``: ``terms`` that add up to its growth rate but for ``closure``.
 
     ``shares`` are those of the kinetic, density and thermal energy. Rates are in sqrt(g cos(theta)/d).
@@ -84,21 +84,21 @@ class Budget:
 
 
 @on_one_thread
-def energy_budget(mode: Mode) -> Budget:
+def energy_budget(mode: Mode) -> ModeBudget:
     """The energy budget of ``mode``, on the grid on which it was computed."""
     at = _Disturbed.of(mode)
     terms = tuple(_terms(at))
     closure = mode.growth - sum(term.total for term in terms)
     total = sum(at.energies)
     kinetic, density, thermal = (part / total for part in at.energies)
-    return Budget(mode, terms, (kinetic, density, thermal), closure)
+    return ModeBudget(mode, terms, (kinetic, density, thermal), closure)
 
 
 @dataclass(frozen=True, eq=False)
 class _Disturbed:
     """A mode and what it disturbs, at the nodes from far above down to the base."""
 
-    base: Base
+    base: BaseState
     kx: float
     ky: float
     n: Complex
@@ -196,7 +196,7 @@ class _Disturbed:
         return self.base.derivative @ self.base.profile.velocity
 
 
-def _stiffness(base: Base, law: Grains) -> Array:
+def _stiffness(base: BaseState, law: Material) -> Array:
     """nu dp/dnu at constant T."""
     nu, T = base.profile.volume_fraction, base.profile.granular_temperature
     nothing = FirstOrder(np.zeros(len(nu)), np.zeros((len(nu), 1)))

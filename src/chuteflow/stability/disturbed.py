@@ -14,13 +14,13 @@ from chuteflow.errors import InputError
 from chuteflow.stability import relaxation
 from chuteflow.stability.layer import Layer
 from chuteflow.stability.planes import FamilyMap, WaveMap, family_map, wave_map
-from chuteflow.stability.relaxation import Relaxation, disturbed, outcome
+from chuteflow.stability.relaxation import Relaxation, disturb, outcome
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 
-#: Flows of a family between which others are solved, and the range of surface temperatures, where a chute is given.
+#: Flows of a branch between which others are solved, and the range of surface temperatures, where a chute is given.
 FLOWS, TEMPERATURES = 80, (0.05, 50.0)
-#: How long a flow is followed, and by how much it is heated, unless something else is asked for.
+#: How long a flow is followed, and by how much it is heated, by default.
 DURATION, LONGEST, HEAT = 2000.0, 1e8, 1.1
 Progress = Callable[[float], None]
 
@@ -40,7 +40,7 @@ def growth(
         kx: range of wavenumbers along the slope, in 1/d; by default to three times that of the fastest growing mode.
         ky: range of wavenumbers across the slope.
         size: points along kx and ky.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
@@ -56,15 +56,15 @@ def neutral(
     size: tuple[int, int] = (24, 24),
     progress: Progress | None = None,
 ) -> FamilyMap:
-    """Growth rates of waves in one direction along a family of flows, with the neutral curves.
+    """Growth rates of waves in one direction along a branch of flows, with the neutral curves.
 
     Args:
-        line: neighbouring flows of one family: a branch, the first branch of a curve, or a chute, of which the hottest
-            family is followed over surface temperatures from 0.05 to 50.
+        line: neighbouring flows of one branch: a branch, the first branch of a curve, or a chute, of which the hottest
+            branch is followed over surface temperatures from 0.05 to 50.
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
-        size: points along k h and along the family.
-        progress: called with the share that is done.
+        size: points along k h and along the branch.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, a chute without flows, and where stability cannot be posed.
@@ -98,7 +98,7 @@ def relax(
 
     Raises:
         InputError: for a factor or duration out of range.
-        SolveError: where the integration cannot go on.
+        SolveError: where the integration cannot continue.
     """
     duration = number("duration", duration)
     if not 0.0 < duration <= LONGEST:
@@ -106,7 +106,7 @@ def relax(
     if temperature is None:
         temperature = HEAT if velocity is None else 1.0
     layer = Layer.of(flow)
-    start = disturbed(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
+    start = disturb(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
     moments = []
     for moment in relaxation.relax(layer, start, duration):
         moments.append(moment)

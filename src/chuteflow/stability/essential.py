@@ -18,23 +18,23 @@ import numpy as np
 
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
-from chuteflow.stability.base import Base, Resolution, shares
+from chuteflow.stability.base import BaseState, Resolution, shares
 from chuteflow.steady.flow import Flow
 
 #: Points of the curve for each node of a grid.
 _FINENESS = 6
 
 
-def relaxation(flow_base: Base) -> tuple[Array, Array]:
+def relaxation(flow_base: BaseState) -> tuple[Array, Array]:
     """u and -Re sigma_c on a grid several times as fine as that of ``flow_base``."""
     resolution = flow_base.resolution
     fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
     return relaxation_at(flow_base.flow, shares(grid(fine.degree).nodes, fine)[0])
 
 
-def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
-    """u and -Re sigma_c where ``share`` of the mass lies above."""
-    profile = flow.at_overburden(share)
+def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:
+    """u and -Re sigma_c where ``fraction`` of the mass lies above."""
+    profile = flow.at_overburden(fraction)
     nu, T = profile.volume_fraction, profile.granular_temperature
     chute, chosen = flow.chute, flow.law
     g = chosen.coefficients(nu, 1.0 - nu / chosen.densest, chute.restitution, chute.slope)
@@ -45,16 +45,10 @@ def relaxation_at(flow: Flow, share: Array) -> tuple[Array, Array]:
     return profile.velocity, nu * stiffness / viscosity
 
 
-def continuous_spectrum(flow_base: Base, kx: float) -> Complex:
-    """sigma_c(z) from far above down to the base, as points of a curve; it does not depend on ky."""
-    velocity, rate = relaxation(flow_base)
-    return -1j * kx * velocity - rate
-
-
 def distance(values: Complex, curve: Complex) -> Array:
     """Distance of each of ``values`` (m,) to the polygon through the points of ``curve``."""
     start, step = curve[:-1], np.diff(curve)
     length = np.maximum(np.abs(step) ** 2, 1e-300)
     off = values[:, None] - start
-    share = np.clip((off * step.conj()).real / length, 0.0, 1.0)
-    return np.abs(off - share * step).min(axis=1)
+    fraction = np.clip((off * step.conj()).real / length, 0.0, 1.0)
+    return np.abs(off - fraction * step).min(axis=1)

@@ -37,12 +37,12 @@ from chuteflow.steady.flow import Flow
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Coefficients, Law
-from chuteflow.theory.transport import Grains, Vector, traction
+from chuteflow.theory.transport import Material, Vector, traction
 
 #: Degree of the grid in m.
 DEGREE = 40
 FIELDS = 4
-#: Share of the mass above the highest node, where fields are those of the far field to rounding.
+#: Fraction of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
 #: Densities far above the base fall off to zero.
 _vanishing = np.errstate(under="ignore")
@@ -67,7 +67,7 @@ class Power:
     """Rates of energy per unit area of the base, in rho_p (g d cos theta)^(3/2).
 
     ``gravity`` is s Q, its work along the slope; ``collisions`` of the grains with each other and with the
-    ``base`` lose energy. Without heat through the surface the total energy changes with what is left of it.
+    ``base`` lose energy. Without heat through the surface the total energy changes with what is left.
     """
 
     gravity: float
@@ -119,10 +119,11 @@ class Layer:
         """
         if flow.chute.surface != "free":
             raise InputError(
-                "the interface is known for steady flows alone: time needs the free surface, give --surface free"
+                "the interface is known only for steady flows: time dependence needs the free surface, give "
+                "--surface free"
             )
         require_richman(flow.chute.base, "disturbed flows are")
-        Grains(flow.law, flow.chute.restitution, flow.chute.slope)
+        Material(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
         return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
 

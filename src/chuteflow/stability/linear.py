@@ -34,10 +34,10 @@ from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
-from chuteflow.stability.base import Base
+from chuteflow.stability.base import BaseState
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import Coefficients
-from chuteflow.theory.transport import Fields, Grains, Motion, Vector, base_conditions, motion
+from chuteflow.theory.transport import Fields, Material, Motion, Vector, base_conditions, motion
 
 #: Order of the unknowns n, u, v, w, tau, each at all nodes from the top to the base, with omega for the first n.
 DENSITY, ALONG, ACROSS, UP, HEAT = range(5)
@@ -45,7 +45,7 @@ FIELDS = 5
 
 #: Wavenumbers at which the quadratic operator is evaluated, and their monomials 1, kx, ky, kx^2, kx ky, ky^2.
 _SAMPLES = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1]], dtype=float)
-#: Step, in shares of k, of the derivatives of the gas above the grid: smooth, and small beside the rest.
+#: Step, in fractions of k, of the derivatives of the gas above the grid: smooth, and small beside the rest.
 _DIFFERENCE = 1e-5
 
 
@@ -57,7 +57,7 @@ def _monomials(kx: Any, ky: Any) -> NDArray[Any]:
 class Operator:
     """Matrices of the disturbances of ``base``: A v = sigma diag(weights) v, 5 (degree + 1) unknowns."""
 
-    base: Base
+    base: BaseState
     powers: Complex
     weights: Array
     top: tuple[float, float]
@@ -112,7 +112,7 @@ class Operator:
         return self.base.profile.height
 
 
-def steady_motion(base: Base) -> Motion:
+def steady_motion(base: BaseState) -> Motion:
     """The full equations on the steady flow itself: forces vanish (tested), with plain fields."""
 
     def gradient(f: Any) -> Vector:
@@ -121,7 +121,7 @@ def steady_motion(base: Base) -> Motion:
     return motion(_steady(base), gradient, grains(base))
 
 
-def grains(base: Base) -> Grains:
+def grains(base: BaseState) -> Material:
     """The law of the chute.
 
     Raises:
@@ -134,10 +134,10 @@ def grains(base: Base) -> Grains:
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
     require_richman(chute.base, "disturbed flows are")
-    return Grains(base.flow.law, chute.restitution, chute.slope)
+    return Material(base.flow.law, chute.restitution, chute.slope)
 
 
-def operator(base: Base) -> Operator:
+def operator(base: BaseState) -> Operator:
     """The operator of the disturbances of ``base``.
 
     Raises:
@@ -150,7 +150,7 @@ def operator(base: Base) -> Operator:
     return Operator(base, powers, weights[0], (_viscosity(base), flux))
 
 
-def _steady(base: Base) -> Fields:
+def _steady(base: BaseState) -> Fields:
     profile = base.profile
     still = np.zeros(base.points)
     return Fields(
@@ -158,7 +158,7 @@ def _steady(base: Base) -> Fields:
     )
 
 
-def _linearised(base: Base, kx: float, ky: float) -> tuple[Complex, Array]:
+def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
     """A without the gas above the grid, and the weights of the time derivatives."""
     steady = _steady(base)
     values = np.array([steady.log_density, *steady.velocity, steady.log_temperature])
@@ -185,7 +185,7 @@ def _linearised(base: Base, kx: float, ky: float) -> tuple[Complex, Array]:
     return matrix, weights
 
 
-def without_top(base: Base) -> Array:
+def without_top(base: BaseState) -> Array:
     """Matrix that puts for the nodal value at the top what the polynomial through all others has there."""
     matrix = np.eye(base.points)
     matrix[0] = -base.grid.barycentric / base.grid.barycentric[0]
@@ -193,7 +193,7 @@ def without_top(base: Base) -> Array:
     return matrix
 
 
-def _add_load(base: Base, matrix: Complex, kx: float, ky: float) -> None:
+def _add_load(base: BaseState, matrix: Complex, kx: float, ky: float) -> None:
     """The weight of the grains above the grid, and their balance of mass in the first row."""
     profile = base.profile
     u, v, w = (field * base.points for field in (ALONG, ACROSS, UP))
@@ -209,19 +209,19 @@ def _add_load(base: Base, matrix: Complex, kx: float, ky: float) -> None:
     )
 
 
-def _viscosity(base: Base) -> float:
+def _viscosity(base: BaseState) -> float:
     """eta at the top."""
     g, root_t = _at_top(base)
     return float(g.viscosity[0]) * root_t
 
 
-def _conductivity(base: Base) -> float:
+def _conductivity(base: BaseState) -> float:
     """K at the top."""
     g, root_t = _at_top(base)
     return float(g.conductivity[0]) * root_t
 
 
-def _at_top(base: Base) -> tuple[Coefficients, float]:
+def _at_top(base: BaseState) -> tuple[Coefficients, float]:
     """The coefficients of the law, and sqrt(T), at the top."""
     chute, law = base.flow.chute, base.flow.law
     nu = base.profile.volume_fraction[:1]

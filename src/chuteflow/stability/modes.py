@@ -1,4 +1,4 @@
-"""Normal modes of a steady flow: computed twice, told from the continuous spectrum, each with its error.
+"""Normal modes of a steady flow: computed twice, distinguished from the continuous spectrum, each with its error.
 
 An eigenvalue of the coarse grid is a mode if
 
@@ -21,9 +21,9 @@ from chuteflow import display
 from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
-from chuteflow.numerics.eigenproblem import Complex, refined, spectrum
+from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue, spectrum
 from chuteflow.result import Compared
-from chuteflow.stability.base import Base, Resolution, base, shares
+from chuteflow.stability.base import BaseState, Resolution, base, shares
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -38,12 +38,12 @@ _SCREEN = 20
 _REACH, _SHORT = ((10.5, 13.0), (12.0, 14.5), (13.5, 16.5)), 1.0 / 60.0
 #: Steps in which the reach grows, so that wavenumbers share grids.
 _STRIDE = 1.5
-#: Largest share of the last coefficients of a resolved density.
+#: Largest fraction of the last coefficients of a resolved density.
 _TAIL = 0.03
-#: Largest share that the change between grids may have in the distance to the continuous spectrum; what moves by
+#: Largest fraction that the change between grids may have in the distance to the continuous spectrum; what moves by
 #: more than the second on the finest grids is an artefact of them.
 _DRIFT, _ARTEFACT = 1e-3, 0.03
-#: Error of a rate that is asked for unless told otherwise; relative for rates above 1.
+#: Default error of a rate; relative for rates above 1.
 TOLERANCE = 1e-6
 #: Growth that counts as none, in sqrt(g cos(theta)/h); and a rate at k = 0 that is that of the mass mode.
 NEUTRAL, AT_REST = 1e-6, 1e-10
@@ -134,9 +134,9 @@ class Mode(Compared):
         """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
         base_ = self.operator.base
         s = grid(points - 1).nodes[::-1]
-        share, _ = shares(s, base_.resolution)
+        fraction, _ = shares(s, base_.resolution)
         matrix = interpolation_matrix(base_.grid, s)
-        return self.flow.at_overburden(share).height, self.fields @ matrix.T
+        return self.flow.at_overburden(fraction).height, self.fields @ matrix.T
 
 
 def relative_fields(of: Operator, vector: Complex) -> Complex:
@@ -236,10 +236,10 @@ class Disturbances:
         return self._compared(kx, ky, candidate, level)[0]
 
     def _compared(self, kx: float, ky: float, candidate: complex, level: int) -> tuple[Mode | None, float]:
-        """The same, and the change between the grids in shares of the distance to the continuous spectrum."""
+        """The same, and the change between the grids in fractions of the distance to the continuous spectrum."""
         coarse, fine = self._resolutions(kx, ky, level)
         of = self.operator(fine)
-        sigma, vector = refined(of.matrix(kx, ky), of.weights, candidate)
+        sigma, vector = refine_eigenvalue(of.matrix(kx, ky), of.weights, candidate)
         error = abs(sigma - candidate)
         away = max(float(distance(np.array([sigma]), self._curve(coarse, kx))[0]), 1e-300)
         if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
@@ -251,7 +251,7 @@ class Disturbances:
     def followed(self, kx: float, ky: float, near: complex, level: int = 0) -> Mode | None:
         """The mode whose rate is closest to ``near``, its value at wavenumbers close by: much faster than a search."""
         of = self.coarse_operator(kx, ky, level)
-        return self.checked(kx, ky, refined(of.matrix(kx, ky), of.weights, near)[0], level)
+        return self.checked(kx, ky, refine_eigenvalue(of.matrix(kx, ky), of.weights, near)[0], level)
 
     def coarse_operator(self, kx: float, ky: float, level: int = 0) -> Operator:
         """The operator on the coarse grid for these wavenumbers."""
@@ -287,7 +287,7 @@ class Disturbances:
         velocity, rate = self._rates[resolution]
         return -1j * kx * velocity - rate
 
-    def _base(self, resolution: Resolution) -> Base:
+    def _base(self, resolution: Resolution) -> BaseState:
         return self.operator(resolution).base
 
 
@@ -297,7 +297,7 @@ def leading(
     """The leading modes on the first grids that tell what grows and know it to ``tolerance``, or on the finest.
 
     Raises:
-        UnresolvedError: where the finest grids do not tell.
+        UnresolvedError: where the finest grids do not resolve it.
     """
     found: list[Mode] = []
     doubtful = True

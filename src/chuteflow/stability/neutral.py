@@ -3,7 +3,7 @@
 # notation: z = (a, b) coordinates of the plane, both of order one; sigma eigenvalue of the mode that is followed.
 
 The plane is that of the wavenumbers of one flow, or that of the wavenumber of waves in one direction and the place
-along a family of flows (:mod:`chuteflow.stability.planes`). The curve is that of Re sigma(z) = 0: one equation in two
+along a branch of flows (:mod:`chuteflow.stability.planes`). The curve is that of Re sigma(z) = 0: one equation in two
 unknowns for the general continuation of :mod:`chuteflow.numerics.continuation`, with sigma followed from point to
 point. A scan of the plane says where curves are; each is entered from there. What changes between two grids is the
 error of a point; where that is large the mode has run into the continuous spectrum, and the curve ends.
@@ -22,26 +22,29 @@ from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control, Point, closes, trace
-from chuteflow.numerics.eigenproblem import Complex, refined
+from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, closes, trace
+from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue
+from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.result import Compared
 from chuteflow.stability.modes import Disturbances
 
 #: Steps of the central differences that give the slope of sigma: Newton's method does with few digits of it.
 _STEP = 1e-4
-#: The grids on which curves are followed, and on which their points are judged.
-_LEVEL, _JUDGE = 1, 2
-#: A mode changes with the coordinates as at the point before, by this share of the larger square of both slopes.
+#: The grids on which curves are followed, and on which the errors of their points are estimated.
+_LEVEL, _FINEST = 1, 2
+#: A mode changes with the coordinates as at the point before, by this fraction of the larger square of both slopes.
 _ALIKE = 0.3
 #: Error of a point, in the coordinates of the plane, beyond which it is none.
 _ASTRAY = 0.02
 #: How curves are followed: arclength is measured in the coordinates of the plane.
-CONTROL = Control(initial_step=0.01, min_step=1e-5, max_step=0.04, max_angle=0.25, tolerance=1e-7, max_points=600)
+CONTROL = ContinuationSettings(
+    initial_step=0.01, min_step=1e-5, max_step=0.04, max_angle=0.25, tolerance=1e-7, max_points=600
+)
 #: Curves are one if a point of one lies this near to another.
 _SAME = 0.01
 
 
-class Plane(Protocol):
+class NeutralPlane(Protocol):
     """A rectangle of two coordinates of order one, from (0, 0) to ``size``, each point of it a flow and a wave."""
 
     @property
@@ -55,7 +58,7 @@ class Plane(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class EigenvalueGrid:
     """Leading eigenvalues sigma (m, n) at coordinates ``a`` (m,) and ``b`` (n,).
 
     NaN where no mode is seen and the continuous spectrum leads, which decays, and where ``unresolved``: there it is not
@@ -95,7 +98,9 @@ class NeutralCurve(Compared):
         return display.line("NeutralCurve", display.counted(len(self.z), "point"), f"begins at {self.ends[0]}")
 
 
-def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list[NeutralCurve]:
+def neutral_curves(
+    plane: NeutralPlane, scan: EigenvalueGrid, control: ContinuationSettings = CONTROL
+) -> list[NeutralCurve]:
     """All neutral curves that ``scan`` sees in ``plane``."""
     found: list[NeutralCurve] = []
     for line in _lines(scan):
@@ -105,7 +110,7 @@ def neutral_curves(plane: Plane, scan: Scan, control: Control = CONTROL) -> list
     return found
 
 
-def _lines(scan: Scan) -> list[Array]:
+def _lines(scan: EigenvalueGrid) -> list[Array]:
     """Rough neutral curves, long ones first: contours of the scan, each (k, 2)."""
     growth = np.real(scan.sigma)
     # Where no mode is seen, the continuous spectrum leads, which decays.
@@ -119,28 +124,39 @@ def _lines(scan: Scan) -> list[Array]:
 
 
 def _entered(
-    plane: Plane, scan: Scan, line: Array, found: Sequence[NeutralCurve], control: Control
+    plane: NeutralPlane, scan: EigenvalueGrid, line: Array, found: Sequence[NeutralCurve], control: ContinuationSettings
 ) -> NeutralCurve | None:
     """The neutral curve near a rough one; None if it is among those found, or cannot be entered."""
-    for share in (0.5, 0.25, 0.75, 0.1, 0.9):
-        i = int(share * (len(line) - 1))
+    for fraction in (0.5, 0.25, 0.75, 0.1, 0.9):
+        i = int(fraction * (len(line) - 1))
         along = line[min(i + 1, len(line) - 1)] - line[max(i - 1, 0)]
         if not along.any():
             continue
         if any(np.hypot(*(curve.z - line[i]).T).min() < _SAME for curve in found):
             return None
-        begin, sigma = _growing(scan, line[i])
-        onward, end = _side(plane, (begin, sigma), line[i], along, control)
-        if len(onward) < 2:
-            continue
-        if end is End.CLOSED:
-            return _curve([*onward, onward[0]], (end, end))
-        back, start = _side(plane, (begin, sigma), line[i], -along, control)
-        return _curve([*back[:0:-1], *onward], (start, end))
+        curve = _through(plane, _growing(scan, line[i]), line[i], along, control)
+        if curve is not None:
+            return curve
     return None
 
 
-def _growing(scan: Scan, near: Array) -> tuple[Array, complex]:
+def _through(
+    plane: NeutralPlane, begin: tuple[Array, complex], start: Array, along: Array, control: ContinuationSettings
+) -> NeutralCurve | None:
+    """The neutral curve near ``start``, of the mode that grows at ``begin``; None if it has no second point there."""
+    onward = _side(plane, begin, start, along, control)
+    if len(onward.points) < 2:
+        return None
+    found = follow_both_sides(lambda sign: onward if sign > 0.0 else _side(plane, begin, start, -along, control))
+    return NeutralCurve(
+        z=np.array([point.z for point in found.points]),
+        frequency=np.array([-point.sigma.imag for point in found.points]),
+        error=np.array([point.error for point in found.points]),
+        ends=found.ends,
+    )
+
+
+def _growing(scan: EigenvalueGrid, near: Array) -> tuple[Array, complex]:
     """The growing point of the scan that is nearest to ``near``, and its eigenvalue."""
     away = np.hypot(*np.meshgrid(scan.a - near[0], scan.b - near[1], indexing="ij"))
     away[~(np.real(scan.sigma) > 0.0)] = np.inf
@@ -157,49 +173,50 @@ class _Neutral:
     error: float
 
 
-def _curve(points: Sequence[_Neutral], ends: tuple[str, str]) -> NeutralCurve:
-    return NeutralCurve(
-        z=np.array([point.z for point in points]),
-        frequency=np.array([-point.sigma.imag for point in points]),
-        error=np.array([point.error for point in points]),
-        ends=ends,
-    )
-
-
 class End(StrEnum):
     """Where a neutral curve ends, as is said of it; one that is lost names the reason beside LOST."""
 
     EDGE = "the edge of the range"
-    CLOSED = "its own beginning: it is closed"
+    CLOSED = "its own start: it is closed"
     CONTINUOUS = "where the mode runs into the continuous spectrum"
     LOST = "a point from which it could not be followed"
 
 
 def _side(
-    plane: Plane, begin: tuple[Array, complex], start: Array, ahead: Array, control: Control
-) -> tuple[list[_Neutral], str]:
-    """Points from ``start`` along ``ahead`` to the edge of the plane, and why they end."""
+    plane: NeutralPlane, begin: tuple[Array, complex], start: Array, ahead: Array, control: ContinuationSettings
+) -> Side[_Neutral]:
+    """The side from ``start`` along ``ahead``, at most to the edge of the plane."""
     system = _GrowthSystem(plane, *begin)
-    points: list[Point[_GrowthSystem]] = []
-    out: list[_Neutral] = []
     path = trace(system, start, direction=ahead, control=control)
-    for point in path:
+    points: list[CurvePoint[_GrowthSystem]] = []
+
+    def extend(
+        side: Side[_Neutral], previous: CurvePoint[_GrowthSystem] | None, point: CurvePoint[_GrowthSystem]
+    ) -> None:
         edge = _edge_passed(plane, point.z)
         if edge is not None:
-            if out:
-                out.extend(_at_edge(system, out[-1].z, point.z, *edge, control))
-            return out, End.EDGE
-        judged = system.judged(point.z)
-        if judged.error > _ASTRAY:
-            return out, End.CONTINUOUS
+            if previous is not None:
+                for last in _at_edge(system, previous.z, point.z, *edge, control):
+                    side.add(last)
+            side.stop(End.EDGE)
+            return
+        neutral = system.followed_to(point.z)
+        if neutral.error > _ASTRAY:
+            side.stop(End.CONTINUOUS)
+            return
         points.append(point)
-        out.append(judged)
         if len(points) > 3 and closes(points[0], points[-2], points[-1]):
-            return out[:-1], End.CLOSED
-    return out, f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})"
+            side.stop(End.CLOSED, closed=True)
+            return
+        side.add(neutral)
+
+    side = follow_side(path, Side(), extend)
+    if path.status is not ContinuationStatus.RUNNING:
+        side.stop(f"{End.LOST} ({path.status.name.lower().replace('_', ' ')})")
+    return side
 
 
-def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:
+def _edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
     """The coordinate that is outside the plane, and the edge that it has passed."""
     for i, end in enumerate(plane.size):
         if z[i] < 0.0:
@@ -210,16 +227,16 @@ def _edge_passed(plane: Plane, z: Array) -> tuple[int, float] | None:
 
 
 def _at_edge(
-    system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: Control
+    system: _GrowthSystem, inside: Array, outside: Array, which: int, edge: float, control: ContinuationSettings
 ) -> Iterator[_Neutral]:
-    """The point of the curve where coordinate ``which`` is ``edge``, if there is one to be had."""
-    share = (edge - inside[which]) / (outside[which] - inside[which])
+    """The point of the curve where coordinate ``which`` is ``edge``, if there is one."""
+    fraction = (edge - inside[which]) / (outside[which] - inside[which])
     direction = np.eye(2)[which]
-    for point in trace(system, inside + share * (outside - inside), direction=direction, control=control):
+    for point in trace(system, inside + fraction * (outside - inside), direction=direction, control=control):
         z = np.where(direction > 0.0, edge, point.z)
-        judged = system.judged(z)
-        if judged.error <= _ASTRAY:
-            yield judged
+        neutral = system.followed_to(z)
+        if neutral.error <= _ASTRAY:
+            yield neutral
         return
 
 
@@ -244,13 +261,14 @@ class _Eigenvalue:
 class _GrowthSystem:
     """Re sigma(z) = 0 for the mode that is ``sigma`` at ``begin``, followed from one point to the next.
 
-    A real rate that vanishes does so at the end of the continuous spectrum, of which a grid has points close below:
-    these are told from the mode by their slopes.
+    The mode at z is the one nearest to what is extrapolated from the last accepted point or the last trial of Newton's
+    method, whichever is nearer. A real rate that vanishes does so at the end of the continuous spectrum, of which a
+    grid has points close below. Trials that lead to these are recognised by their slopes, and not extrapolated from.
     """
 
-    def __init__(self, plane: Plane, begin: Array, sigma: complex) -> None:
+    def __init__(self, plane: NeutralPlane, begin: Array, sigma: complex) -> None:
         self._plane = plane
-        self._sure = self._tried = self._with_slope(begin, sigma)
+        self._accepted = self._trial = self._with_slope(begin, sigma)
 
     @property
     def weights(self) -> Array:
@@ -260,19 +278,19 @@ class _GrowthSystem:
     def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""
         there = self._followed(z)
-        if self._sure.same_mode(there):
-            self._tried = there
+        if self._accepted.same_mode(there):
+            self._trial = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
 
-    def judged(self, z: Array) -> _Neutral:
+    def followed_to(self, z: Array) -> _Neutral:
         """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""
-        self._sure = self._tried = there = self._followed(z)
-        growth = self._sigma(z, there.sigma, _JUDGE).real - there.sigma.real
+        self._accepted = self._trial = there = self._followed(z)
+        growth = self._sigma(z, there.sigma, _FINEST).real - there.sigma.real
         steepness = float(np.hypot(*np.real(there.slope)))
         return _Neutral(z, there.sigma, abs(growth) / steepness if steepness > 0.0 else np.inf)
 
     def _followed(self, z: Array) -> _Eigenvalue:
-        nearest = min((self._tried, self._sure), key=lambda known: float(np.abs(known.z - z).max()))
+        nearest = min((self._trial, self._accepted), key=lambda known: float(np.abs(known.z - z).max()))
         return self._with_slope(z, nearest.at(z))
 
     def _with_slope(self, z: Array, near: complex) -> _Eigenvalue:
@@ -285,4 +303,4 @@ class _GrowthSystem:
     def _sigma(self, z: Array, near: complex, level: int = _LEVEL) -> complex:
         disturbances, kx, ky = self._plane.wave(z)
         of = disturbances.coarse_operator(kx, ky, level)
-        return refined(of.matrix(kx, ky), of.weights, near)[0]
+        return refine_eigenvalue(of.matrix(kx, ky), of.weights, near)[0]

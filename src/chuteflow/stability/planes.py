@@ -1,7 +1,7 @@
 """The planes in which growth rates are mapped and neutral curves followed, and the scans of them.
 
 One is that of the wavenumbers along and across the slope of one flow. The other has the wavenumber of waves in one
-direction, in the logarithm, and the place along a family of flows.
+direction, in the logarithm, and the place along a branch of flows.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import display
+from chuteflow.branches.paths import flow_between
 from chuteflow.checks import checked_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
-from chuteflow.stability.family import flow_between
 from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
-from chuteflow.stability.neutral import NeutralCurve, Plane, Scan, neutral_curves
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.neutral import EigenvalueGrid, NeutralCurve, NeutralPlane, neutral_curves
+from chuteflow.stability.result import stability_of
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
-#: Called with the share of a scan that is done.
+#: Called with the fraction of a scan that is done.
 Progress = Callable[[float], None]
-#: Flows of a family whose operators are kept, for the next point is near.
+#: Flows of a branch whose operators are kept, for the next point is near.
 _KEPT = 8
 _MOST_POINTS, _LARGEST_DEPTH_WAVENUMBER = 400, 100.0
 
@@ -46,18 +46,18 @@ class WavePlane:
 
     @property
     def size(self) -> tuple[float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         return 1.0, 1.0
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         kx, ky = np.array(self.low) + np.array(self.unit) * z
         return self.disturbances, float(kx), float(ky)
 
 
 @dataclass(frozen=True, eq=False)
 class FamilyPlane:
-    """Waves at one ``angle`` to the slope (radians) on the flows of a family.
+    """Waves at one ``angle`` to the slope (radians) on the flows of a branch.
 
     The first coordinate is (ln k - low) / unit, of k h with h the centre of mass; the second runs from the first to
     the last of ``flows`` by 0 to 1.
@@ -71,19 +71,19 @@ class FamilyPlane:
 
     @property
     def size(self) -> tuple[float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         return 1.0, 1.0
 
     def named(self, z: Array) -> Array:
-        """k h and the place along the family at points z (n, 2)."""
+        """k h and the place along the branch at points z (n, 2)."""
         return np.stack([np.exp(self.low + self.unit * z[:, 0]), z[:, 1]], axis=1)
 
     def flow(self, place: float) -> Flow:
-        """The flow at a place between 0 and 1 along the family, or a little outside."""
+        """The flow at a place between 0 and 1 along the branch, or a little outside."""
         return self._at(place).flow
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
-        """See :class:`chuteflow.stability.neutral.Plane`."""
+        """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
         disturbances = self._at(float(z[1]))
         k = float(np.exp(self.low + self.unit * z[0])) / disturbances.flow.centre_of_mass
         along, across = np.cos(self.angle), np.sin(self.angle)
@@ -99,8 +99,9 @@ class FamilyPlane:
         return self._kept[place]
 
 
-def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent) -> Scan:
-    """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not tell, that is marked."""
+def scan_plane(plane: NeutralPlane, points: tuple[int, int], progress: Progress = _silent) -> EigenvalueGrid:
+    """Leading eigenvalues at ``points`` evenly spaced over ``plane``; where the grids do not resolve it, that is
+    marked."""
     a, b = (np.linspace(0.0, end, n) for end, n in zip(plane.size, points, strict=True))
     sigma = np.full(points, complex(np.nan, np.nan))
     grows, unresolved = np.zeros(points, dtype=bool), np.zeros(points, dtype=bool)
@@ -117,16 +118,17 @@ def scanned(plane: Plane, points: tuple[int, int], progress: Progress = _silent)
                 sigma[i, j] = found[0].sigma
                 grows[i, j] = found[0].growth > max(disturbances.smallest_rate, found[0].error)
         progress((j + 1) / len(b))
-    return Scan(a, b, sigma, grows, unresolved)
+    return EigenvalueGrid(a, b, sigma, grows, unresolved)
 
 
 @dataclass(frozen=True, eq=False)
 class WaveMap(Result):
     """Growth rates and frequencies (m, n) of the leading modes of ``flow`` over ``kx`` (m,) and ``ky`` (n,), in 1/d.
 
-    NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n): there the
-    grids do not tell whether something grows. ``grows`` (m, n) is where a mode grows faster than ``smallest_rate``
-    and its error. Points z (k, 2) of the ``neutral`` curves are kx and ky, and their errors are in 1/d.
+    NaN where no mode is distinguished from the continuous spectrum, which decays, and where ``unresolved`` (m, n):
+    there the grids do not resolve whether a disturbance grows. ``grows`` (m, n) is where a mode grows faster than
+    ``smallest_rate`` and its error. Points z (k, 2) of the ``neutral`` curves are kx and ky, and their errors are in
+    1/d.
     """
 
     flow: Flow
@@ -149,11 +151,11 @@ class WaveMap(Result):
 
 @dataclass(frozen=True, eq=False)
 class FamilyMap(Result):
-    """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a family.
+    """Growth rates and frequencies (m, n) of waves at ``angle`` (degrees) to the slope on the flows of a branch.
 
     ``depth_wavenumber`` (m,) is k h with h the centre of mass, and ``flows`` (n) are those of the columns. NaN,
     ``grows`` and ``unresolved`` (m, n) are as in :class:`WaveMap`, with the ``smallest_rate`` (n) of each flow. Of each
-    of the ``neutral`` curves, z (k, 2) is k h and the place along the family from 0 to 1, the error is that of
+    of the ``neutral`` curves, z (k, 2) is k h and the place along the branch from 0 to 1, the error is that of
     ln(k h), and ``neutral_flows`` has the flows.
     """
 
@@ -205,7 +207,7 @@ def wave_map(
         kx: range along the slope in 1/d; by default from 0 to three times the wavenumber of the fastest growing mode.
         ky: the same across the slope.
         size: points along kx and ky; about 20 ms each.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for wavenumbers or sizes out of range, and where stability cannot be posed.
@@ -218,7 +220,7 @@ def wave_map(
     ends = [(0.0, usual) if given is None else given for given in (kx, ky)]
     low, unit = [low for low, _ in ends], [high - low for low, high in ends]
     plane = WavePlane(Disturbances(flow), (low[0], low[1]), (unit[0], unit[1]))
-    scan = scanned(plane, size, progress)
+    scan = scan_plane(plane, size, progress)
     curves = neutral_curves(plane, scan)
     scaled = [replace(c, z=np.array(low) + np.array(unit) * c.z, error=c.error * max(unit)) for c in curves]
     return WaveMap(
@@ -244,21 +246,21 @@ def family_map(
     size: tuple[int, int] = (24, 24),
     progress: Progress = _silent,
 ) -> FamilyMap:
-    """Growth rates of waves in one direction along a family of flows, with the neutral curves.
+    """Growth rates of waves in one direction along a branch of flows, with the neutral curves.
 
     Args:
         flows: neighbouring flows of one branch of :func:`chuteflow.curve`, in order.
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
-        size: points along k h, evenly in the logarithm, and along the family; about 20 ms each.
-        progress: called with the share that is done.
+        size: points along k h, evenly in the logarithm, and along the branch; about 20 ms each.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
     """
     _check_size(size)
     if len(flows) < 2:
-        raise InputError(f"{len(flows)} flow: a family needs at least 2")
+        raise InputError(f"{len(flows)} flow: a branch needs at least 2")
     angle = number("angle", angle)
     if not 0.0 <= angle <= 90.0:
         raise InputError(f"angle {angle:g}: must be from 0 (along the slope) to 90 (across), in degrees")
@@ -267,7 +269,7 @@ def family_map(
         raise InputError(f"k h from {low:g} to {high:g}: must rise, from above 0 to {_LARGEST_DEPTH_WAVENUMBER:g}")
     low, high = np.log((low, high))
     plane = FamilyPlane(flows, float(np.radians(angle)), float(low), float(high - low))
-    scan = scanned(plane, size, progress)
+    scan = scan_plane(plane, size, progress)
     curves = neutral_curves(plane, scan)
     columns = tuple(plane.flow(float(place)) for place in scan.b)
     return FamilyMap(

@@ -22,13 +22,13 @@ from chuteflow.threads import on_one_thread
 
 #: Relative error of a step in time.
 TOLERANCE = 1e-7
-#: A flow comes to rest whose temperature at the base has fallen to this share, and whose density there has risen to
-#: this share of the densest.
+#: A flow comes to rest whose temperature at the base has fallen to this fraction, and whose density there has risen to
+#: this fraction of the densest.
 _COLD, _PACKED = 1e-4, 0.995
 
 
 @dataclass(frozen=True, eq=False)
-class Moment(Compared):
+class RelaxationState(Compared):
     """A state on the way, with its time, Q, h, and T at the surface and at the base."""
 
     time: float
@@ -48,7 +48,7 @@ class Outcome(Compared):
     time: negative where the flow approaches. At late times that is no rate of a mode: what is left then belongs to the
     continuous spectrum, which touches zero, and its slowest part on the grid of the integration depends on the grid.
     ``leading`` is the growth rate of the leading discrete mode of the nearest flow that is the same all along the
-    chute, the mass mode set apart; None where none is told.
+    chute, the mass mode set apart; None where none is resolved.
     """
 
     steady: tuple[Flow, ...]
@@ -65,7 +65,7 @@ class Relaxation(Result):
     and the steady flow that it has come to."""
 
     flow: Flow
-    moments: tuple[Moment, ...]
+    moments: tuple[RelaxationState, ...]
     outcome: Outcome
 
     def __repr__(self) -> str:
@@ -81,7 +81,7 @@ class Relaxation(Result):
         return display.html_table(repr(self)[1:-1], [SCALED[name].symbol for name in names], rows)
 
 
-def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERANCE) -> Iterator[Moment]:
+def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERANCE) -> Iterator[RelaxationState]:
     """The states from ``state`` on for ``duration``, as the integration comes by them; the first is ``state`` itself.
 
     The integration is implicit, of order 5 (Radau), with the exact Jacobian. It ends early where the flow comes to
@@ -94,7 +94,7 @@ def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERA
         tolerance: relative error of each step in tau, u, w and T.
 
     Raises:
-        SolveError: where the integration cannot go on.
+        SolveError: where the integration cannot continue.
     """
     stepper = Radau(
         lambda _, y: layer.rate(y),
@@ -106,24 +106,24 @@ def relax(layer: Layer, state: Array, duration: float, tolerance: float = TOLERA
         atol=1e-2 * tolerance,
     )
     step = on_one_thread(stepper.step)
-    first = last = Moment(0.0, *layer.numbers(state), state)
+    first = last = RelaxationState(0.0, *layer.numbers(state), state)
     yield first
     while stepper.status == "running" and not _at_rest(layer, first, last):
         with np.errstate(all="ignore"):
             step()
         if stepper.status == "failed" or not np.isfinite(stepper.y).all():
             raise SolveError(f"the flow cannot be followed beyond t = {stepper.t:.6g}: disturb it less")
-        last = Moment(float(stepper.t), *layer.numbers(stepper.y), stepper.y.copy())
+        last = RelaxationState(float(stepper.t), *layer.numbers(stepper.y), stepper.y.copy())
         yield last
 
 
-def _at_rest(layer: Layer, first: Moment, last: Moment) -> bool:
+def _at_rest(layer: Layer, first: RelaxationState, last: RelaxationState) -> bool:
     return last.base_temperature < _COLD * first.base_temperature and layer.base_density(last.state) > _PACKED
 
 
 @on_one_thread
 @np.errstate(under="ignore")
-def outcome(layer: Layer, moments: Sequence[Moment]) -> Outcome:
+def outcome(layer: Layer, moments: Sequence[RelaxationState]) -> Outcome:
     """Which steady flow the last of ``moments`` is nearest to, and whether it approaches."""
     steady = tuple(flows(layer.chute, M=layer.mass_holdup))
     last = moments[-1]
@@ -140,7 +140,8 @@ def outcome(layer: Layer, moments: Sequence[Moment]) -> Outcome:
 
 
 def leading_rate(flow: Flow) -> float | None:
-    """Growth rate of the leading discrete mode of ``flow`` at k = 0 but for the mass mode; None where none is told."""
+    """Growth rate of the leading discrete mode of ``flow`` at k = 0 but for the mass mode; None where none is
+    resolved."""
     try:
         found = leading(Disturbances(flow), 0.0, 0.0, count=2)
     except UnresolvedError:
@@ -148,12 +149,12 @@ def leading_rate(flow: Flow) -> float | None:
     return next((mode.growth for mode in found if mode.kind != "mass"), None)
 
 
-def _distance(moment: Moment, flow: Flow) -> float:
+def _distance(moment: RelaxationState, flow: Flow) -> float:
     names = ("mass_flux", "centre_of_mass", "base_temperature")
     return max(abs(getattr(moment, name) / getattr(flow, name) - 1.0) for name in names)
 
 
-def disturbed(state: Array, temperature: float = 1.0, velocity: float = 1.0) -> Array:
+def disturb(state: Array, temperature: float = 1.0, velocity: float = 1.0) -> Array:
     """``state`` with its granular temperature and its velocity multiplied, and its density as it is.
 
     Raises:

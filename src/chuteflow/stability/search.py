@@ -10,7 +10,7 @@ aside too.
 
 The scan is made on a coarse grid. The maxima are computed as modes, on as many grids as it takes, and so is every
 point of the scan where something seems to grow faster than the best of them: it is faster, or an artefact of the
-coarse grid, or remains unresolved, which is told.
+coarse grid, or remains unresolved, which is reported.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.eigenproblem import Complex, Eigenpair, refined_pair
+from chuteflow.numerics.eigenproblem import Complex, Eigenpair, refine_eigenpair
 from chuteflow.stability.linear import Operator
 from chuteflow.stability.modes import (
     DEGREES,
@@ -50,15 +50,15 @@ _ROUGH, _EXACT = 1e-4, 1e-7
 _EVALUATIONS = 30
 #: Angles aside of a wave along or across at which it is seen whether it is a maximum; below the last it is one.
 _ASIDE, _ALIGNED = np.radians((1.5, 4.0)), np.radians(0.2)
-#: Maxima are one if they are this near in ln k and a, and an ascent that gains more than this share is gone on with.
+#: Maxima are one if they are this near in ln k and a, and an ascent that gains more than this fraction is gone on with.
 _SAME, _GAIN, _ANEW = 0.05, 1e-4, 3
 #: Unresolved points after which further ones are not tried: each costs the finest grids.
 _MOST_UNRESOLVED = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Fastest:
-    """What a search found: the ``mode`` of largest growth, and wavenumbers (kx, ky) where it could not be told.
+class FastestMode:
+    """What a search found: the ``mode`` of largest growth, and wavenumbers (kx, ky) where it could not be resolved.
 
     ``examined`` is the number of wavenumbers of the scan.
     """
@@ -69,7 +69,7 @@ class Fastest:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _SearchPoint:
     """A point of the plane of ln k and the angle with an eigenvalue; its vectors and derivatives (2,) once computed."""
 
     log_k: float
@@ -81,7 +81,7 @@ class _Place:
     def distance(self, log_k: float, angle: float) -> float:
         return float(np.hypot(self.log_k - log_k, self.angle - angle))
 
-    def is_same(self, other: _Place) -> bool:
+    def is_same(self, other: _SearchPoint) -> bool:
         """Whether both are one maximum."""
         near = self.distance(other.log_k, other.angle) < _SAME
         return near and abs(self.sigma - other.sigma) < _SAME * abs(self.sigma)
@@ -92,19 +92,19 @@ class _Place:
         return complex(self.sigma + self.slope @ np.array([log_k - self.log_k, angle - self.angle]))
 
 
-def fastest(
+def find_fastest(
     disturbances: Disturbances, searched: tuple[float, float], kx: float | None = None, ky: float | None = None
-) -> Fastest:
+) -> FastestMode:
     """The mode of largest growth with k in ``searched``; a wavenumber that is given is held, and the other searched.
 
     Raises:
         InputError: for wavenumbers out of range, and where stability cannot be posed.
     """
     check_wavenumbers(*(0.0 if k is None else k for k in (kx, ky)))
-    return _Search(disturbances, searched, (kx, ky)).run()
+    return _ModeSearch(disturbances, searched, (kx, ky)).run()
 
 
-class _Search:
+class _ModeSearch:
     """One search: the best mode so far, and what stayed unresolved."""
 
     def __init__(
@@ -117,7 +117,7 @@ class _Search:
         self.best: Mode | None = None
         self.unresolved: list[tuple[float, float]] = []
 
-    def run(self) -> Fastest:
+    def run(self) -> FastestMode:
         """Scan, ascend, and settle what seems to grow faster than the best maximum."""
         logs = np.linspace(*self.bounds, SCAN)
         angles = np.radians(ANGLES) if self.free else np.zeros(1)
@@ -129,7 +129,7 @@ class _Search:
         if self.best is None or self.best.growth < 0.0:
             self._take_longest()
         self._polish()
-        return Fastest(self.best, tuple(dict.fromkeys(self.unresolved)), sheets[0].size)
+        return FastestMode(self.best, tuple(dict.fromkeys(self.unresolved)), sheets[0].size)
 
     def _scanned(self, logs: Array, angles: Array) -> Complex:
         """The leading eigenvalues of the coarsest grid, (_SHEETS, m, n); NaN where there are fewer."""
@@ -173,38 +173,38 @@ class _Search:
     def _take_longest(self) -> None:
         """The longest waves: where nothing grows, they are often the slowest to decay, too near to 0 for the scan."""
         for angle in (0.0, 0.5 * np.pi) if self.free else (0.0,):
-            self._take(self._known(_Place(self.bounds[0], angle, 0j)))
+            self._take(self._known(_SearchPoint(self.bounds[0], angle, 0j)))
 
     def _take(self, mode: Mode | None) -> None:
         if mode is not None and (self.best is None or mode.growth > self.best.growth):
             self.best = mode
 
-    def _maxima(self, starts: list[_Place]) -> list[_Place]:
+    def _maxima(self, starts: list[_SearchPoint]) -> list[_SearchPoint]:
         """Where the ascents end, highest first, each once."""
-        out: list[_Place] = []
+        out: list[_SearchPoint] = []
         ends = chain.from_iterable(map(self._ascended, starts))
         for maximum in sorted(ends, key=lambda place: -place.sigma.real):
             if not any(maximum.is_same(other) for other in out):
                 out.append(maximum)
         return out
 
-    def _take_best(self, maxima: list[_Place]) -> None:
+    def _take_best(self, maxima: list[_SearchPoint]) -> None:
         """The best of the maxima, which are certified from the highest down until one is a mode."""
         for maximum in maxima:
             if self.best is not None and maximum.sigma.real <= self.best.growth:
                 return
             self._certify(maximum)
 
-    def _certify(self, maximum: _Place) -> None:
+    def _certify(self, maximum: _SearchPoint) -> None:
         """Take the leading mode at a maximum; where another one leads there, go on by that."""
         for _ in range(_ANEW):
             mode = self._known(maximum)
             self._take(mode)
             if mode is None or mode.growth < maximum.sigma.real + _GAIN * abs(maximum.sigma.real):
                 return
-            maximum = self._ascended(_Place(maximum.log_k, maximum.angle, mode.sigma))[-1]
+            maximum = self._ascended(_SearchPoint(maximum.log_k, maximum.angle, mode.sigma))[-1]
 
-    def _known(self, place: _Place) -> Mode | None:
+    def _known(self, place: _SearchPoint) -> Mode | None:
         """The leading mode at a place; where that is not told, the one of the place, if it is a mode."""
         kx, ky = self.wave(place.log_k, place.angle)
         try:
@@ -233,28 +233,28 @@ class _Search:
                 self.unresolved.append(wave)
                 continue
             if found and (self.best is None or found[0].growth > self.best.growth):
-                for maximum in self._ascended(_Place(float(logs[i]), float(angles[j]), found[0].sigma)):
+                for maximum in self._ascended(_SearchPoint(float(logs[i]), float(angles[j]), found[0].sigma)):
                     self._certify(maximum)
 
     def _polish(self) -> None:
-        """Climb once more to rounding, on the grid that the best mode was computed on."""
+        """Maximise again to rounding, on the grid that the best mode was computed on."""
         mode = self.best
         if mode is None or mode.direction == "uniform":
             return
         k, angle = float(np.hypot(mode.kx, mode.ky)), float(np.arctan2(mode.ky, mode.kx))
         if not self.free:
             k, angle = mode.ky if self.fixed[1] is None else mode.kx, 0.0
-        start = _Place(float(np.log(k)), angle, mode.sigma)
+        start = _SearchPoint(float(np.log(k)), angle, mode.sigma)
         turning = self.free and min(angle, 0.5 * np.pi - angle) > _ALIGNED
-        maximum = _Ascent(self, start, mode.operator).maximum(start, turning=turning, accuracy=_EXACT)
+        maximum = _GrowthMaximisation(self, start, mode.operator).maximum(start, turning=turning, accuracy=_EXACT)
         polished = self._known(maximum)
         # Near the maximum rates differ by less than their errors: the maximum is where the slope vanishes.
         if polished is not None and polished.growth > mode.growth - max(mode.error, polished.error):
             self.best = polished
 
-    def _ascended(self, start: _Place) -> list[_Place]:
+    def _ascended(self, start: _SearchPoint) -> list[_SearchPoint]:
         """The maxima that a mode leads to: from an axis that along it, and one aside if it is higher there."""
-        ascent = _Ascent(self, start)
+        ascent = _GrowthMaximisation(self, start)
         if not self.free or min(start.angle, 0.5 * np.pi - start.angle) > _ALIGNED:
             return [ascent.maximum(start, turning=self.free)]
         ridge = ascent.maximum(start, turning=False)
@@ -270,22 +270,22 @@ class _LostError(Exception):
     """A mode could not be followed."""
 
 
-class _Ascent:
+class _GrowthMaximisation:
     """The rate of one mode as a function of ln k and the angle, on one grid, followed in small steps."""
 
-    def __init__(self, search: _Search, start: _Place, of: Operator | None = None) -> None:
+    def __init__(self, search: _ModeSearch, start: _SearchPoint, of: Operator | None = None) -> None:
         self.search = search
         self.of = of or search.disturbances.coarse_operator(*search.wave(start.log_k, start.angle))
         self.known = [self._followed(start.log_k, start.angle, start)]
 
-    def at(self, log_k: float, angle: float) -> _Place | None:
+    def at(self, log_k: float, angle: float) -> _SearchPoint | None:
         """The mode at a place; None where it is lost on the way."""
         here = min(self.known, key=lambda place: place.distance(log_k, angle))
         step = _STEP
         while (left := here.distance(log_k, angle)) > 0.0:
-            share = min(1.0, step / left)
-            ahead = here.log_k + share * (log_k - here.log_k), here.angle + share * (angle - here.angle)
-            there = self._followed(*((log_k, angle) if share == 1.0 else ahead), here)
+            fraction = min(1.0, step / left)
+            ahead = here.log_k + fraction * (log_k - here.log_k), here.angle + fraction * (angle - here.angle)
+            there = self._followed(*((log_k, angle) if fraction == 1.0 else ahead), here)
             if self._alike(here, there):
                 self.known.append(there)
                 here, step = there, min(2.0 * step, _STEP)
@@ -295,21 +295,21 @@ class _Ascent:
                     return None
         return here
 
-    def _alike(self, one: _Place, other: _Place) -> bool:
+    def _alike(self, one: _SearchPoint, other: _SearchPoint) -> bool:
         assert one.pair is not None
         assert other.pair is not None
         return one.pair.likeness(other.pair, self.of.weights) > _LIKENESS
 
-    def _followed(self, log_k: float, angle: float, origin: _Place) -> _Place:
+    def _followed(self, log_k: float, angle: float, origin: _SearchPoint) -> _SearchPoint:
         of = self.of
         kx, ky = self.search.wave(log_k, angle)
         start = None if origin.pair is None else origin.pair.right
         near = origin.predicted(log_k, angle)
-        pair = refined_pair(of.matrix(kx, ky), of.weights, near, start=start)
+        pair = refine_eigenpair(of.matrix(kx, ky), of.weights, near, start=start)
         by_k = of.slopes(pair.left, pair.right, kx, ky) / pair.size(of.weights)
-        return _Place(log_k, angle, pair.value, pair, self.search.directions(kx, ky) @ by_k)
+        return _SearchPoint(log_k, angle, pair.value, pair, self.search.directions(kx, ky) @ by_k)
 
-    def maximum(self, start: _Place, *, turning: bool, accuracy: float = _ROUGH) -> _Place:
+    def maximum(self, start: _SearchPoint, *, turning: bool, accuracy: float = _ROUGH) -> _SearchPoint:
         """The local maximum of the rate uphill from ``start``, at its angle unless ``turning``.
 
         Its slope, over the rate at the start, is below ``accuracy``.
@@ -337,12 +337,12 @@ class _Ascent:
         return best
 
 
-def _starts(logs: Array, angles: Array, sheets: Complex) -> list[_Place]:
+def _starts(logs: Array, angles: Array, sheets: Complex) -> list[_SearchPoint]:
     """The local maxima of each sheet of the scan, and those of waves along and across among themselves, highest first.
 
     Waves along and across are stationary in the angle by symmetry, and another mode can lead right beside them.
     """
-    found: list[_Place] = []
+    found: list[_SearchPoint] = []
     for sheet in sheets:
         growth = np.where(np.isfinite(np.real(sheet)), np.real(sheet), -np.inf)
         padded = np.pad(growth, 1, constant_values=-np.inf)
@@ -351,5 +351,5 @@ def _starts(logs: Array, angles: Array, sheets: Complex) -> list[_Place]:
         )
         along_angle[:, [0, -1]] = True
         for i, j in np.argwhere(along_k & along_angle & np.isfinite(growth)):
-            found.append(_Place(float(logs[i]), float(angles[j]), complex(sheet[i, j])))
+            found.append(_SearchPoint(float(logs[i]), float(angles[j]), complex(sheet[i, j])))
     return sorted(found, key=lambda place: -place.sigma.real)[:_CLIMBS]

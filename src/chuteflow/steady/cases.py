@@ -22,7 +22,7 @@ GRAINS = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
 
 
 @dataclass(frozen=True)
-class Known:
+class CaseNumber:
     """A number of a case: its ``value``, ``how`` it is known, its ``uncertainty`` (one standard deviation of what was
     measured, or a range for what is guessed; None for what is defined) and its ``source``."""
 
@@ -47,9 +47,9 @@ class Case:
 
     name: str
     description: str
-    numbers: Mapping[str, Known]
+    numbers: Mapping[str, CaseNumber]
     names: Mapping[str, str] = field(default_factory=dict)
-    grains: Mapping[str, Known] = field(default_factory=dict)
+    grains: Mapping[str, CaseNumber] = field(default_factory=dict)
 
     def chute(self, **others: Any) -> Chute:
         """The chute of this case, with ``others``, arguments of :class:`chuteflow.Chute`, in the place of its own.
@@ -96,8 +96,8 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
     return f"choose one of {', '.join(known)}"
 
 
-def _paper(slope: float, e: float, ew: float, roughness: float) -> dict[str, Known]:
-    return {key: Known(value) for key, value in (("slope", slope), ("e", e), ("ew", ew), ("roughness", roughness))}
+def _paper(slope: float, e: float, ew: float, roughness: float) -> dict[str, CaseNumber]:
+    return {key: CaseNumber(value) for key, value in (("slope", slope), ("e", e), ("ew", ew), ("roughness", roughness))}
 
 
 _FOERSTER = "Foerster, Louge, Chang & Allia 1994, Phys. Fluids 6, 1108"
@@ -122,39 +122,39 @@ CASES: dict[str, Case] = {
             "glass-beads",
             "soda-lime glass beads, 3 mm, on a rough base of aluminium",
             {
-                "e": Known(0.97, MEASURED, 0.01, _FOERSTER),
-                "ew": Known(0.83, MEASURED, 0.02, f"on aluminium; {_FOERSTER}"),
-                "roughness": Known(0.65, GUESSED, 0.1, _GLUED),
+                "e": CaseNumber(0.97, MEASURED, 0.01, _FOERSTER),
+                "ew": CaseNumber(0.83, MEASURED, 0.02, f"on aluminium; {_FOERSTER}"),
+                "roughness": CaseNumber(0.65, GUESSED, 0.1, _GLUED),
             },
             grains={
-                "diameter": Known(3e-3, MEASURED, 5e-5, _FOERSTER),
-                "density": Known(2500.0, MEASURED, 50.0, "handbooks, soda-lime glass"),
+                "diameter": CaseNumber(3e-3, MEASURED, 5e-5, _FOERSTER),
+                "density": CaseNumber(2500.0, MEASURED, 50.0, "handbooks, soda-lime glass"),
             },
         ),
         Case(
             "steel",
             "stainless steel balls, 3 mm, on a rough base of steel",
             {
-                "e": Known(0.95, MEASURED, 0.03, _LORENZ),
-                "ew": Known(0.9, GUESSED, 0.07, "a thick plate of steel loses somewhat more than two balls do"),
-                "roughness": Known(0.65, GUESSED, 0.1, _GLUED),
+                "e": CaseNumber(0.95, MEASURED, 0.03, _LORENZ),
+                "ew": CaseNumber(0.9, GUESSED, 0.07, "a thick plate of steel loses somewhat more than two balls do"),
+                "roughness": CaseNumber(0.65, GUESSED, 0.1, _GLUED),
             },
             grains={
-                "diameter": Known(3e-3, DEFINED),
-                "density": Known(7900.0, MEASURED, 100.0, "handbooks, stainless steel"),
+                "diameter": CaseNumber(3e-3, DEFINED),
+                "density": CaseNumber(7900.0, MEASURED, 100.0, "handbooks, stainless steel"),
             },
         ),
         Case(
             "sand",
             "quartz sand, 0.5 mm, on a base to which the same sand is glued",
             {
-                "e": Known(0.7, GUESSED, 0.15, "grains with corners: no measurement holds for all sands"),
-                "ew": Known(0.7, GUESSED, 0.15, "as of two grains"),
-                "roughness": Known(0.7, GUESSED, 0.1, _GLUED),
+                "e": CaseNumber(0.7, GUESSED, 0.15, "grains with corners: no measurement holds for all sands"),
+                "ew": CaseNumber(0.7, GUESSED, 0.15, "as of two grains"),
+                "roughness": CaseNumber(0.7, GUESSED, 0.1, _GLUED),
             },
             grains={
-                "diameter": Known(5e-4, DEFINED),
-                "density": Known(2650.0, MEASURED, 30.0, "handbooks, quartz"),
+                "diameter": CaseNumber(5e-4, DEFINED),
+                "density": CaseNumber(2650.0, MEASURED, 30.0, "handbooks, quartz"),
             },
         ),
     )

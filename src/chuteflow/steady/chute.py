@@ -9,7 +9,7 @@ from typing import Any
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 from chuteflow.parameters import PARAMETERS
-from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.theory.bases import BASES, BaseCondition, base
 from chuteflow.theory.constitutive import Law, require_positive
 from chuteflow.theory.laws import law
 
@@ -30,7 +30,7 @@ class Chute:
         closure: the constitutive law: its name, a text such as "extended:packing=0.64" or "grains.py:OWN" (see
             :mod:`chuteflow.theory.laws`), or a :class:`chuteflow.theory.constitutive.Law`.
         base: the condition at the base, see :mod:`chuteflow.theory.bases`: its name, with parameters as in
-            "richman:diameter=1.5", or a :class:`chuteflow.theory.bases.Base`.
+            "richman:diameter=1.5", or a :class:`chuteflow.theory.bases.BaseCondition`.
 
     Raises:
         InputError: for a value out of range, naming it, what was given and what is allowed.
@@ -42,7 +42,7 @@ class Chute:
     roughness: float
     surface: str = "free"
     closure: str | Law = "lun"
-    base: str | Base = "richman"
+    base: str | BaseCondition = "richman"
 
     def __post_init__(self) -> None:
         for name, parameter in PARAMETERS.items():

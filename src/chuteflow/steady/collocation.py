@@ -1,6 +1,6 @@
 """The discretised steady problem: Chebyshev collocation in the overburden coordinate, exact Jacobian.
 
-# notation: s grid coordinate, m = P/M share of the overburden, theta heat potential, g = dtheta/dm,
+# notation: s grid coordinate, m = P/M fraction of the overburden, theta heat potential, g = dtheta/dm,
 # otherwise as in chuteflow.steady.model.
 
 The unknown field is g at the nodes of a grid on 0 <= s <= 1; with it go theta at the surface and ln M.
@@ -36,7 +36,7 @@ def stretch_map(s: Array, stretch: Array | float) -> tuple[Array, Array]:
 
 
 def stretch_position(m: Array, stretch: Array | float) -> Array:
-    """s at shares m: the inverse of :func:`stretch_map`."""
+    """s at fractions m: the inverse of :func:`stretch_map`."""
     alpha = np.maximum(stretch, _PLAIN)
     return np.log1p(m * np.expm1(alpha)) / alpha
 
@@ -101,16 +101,16 @@ class State:
         self.g = z[..., :-2]
         self.mass = mass = np.exp(z[..., -1:])
         m, dm = problem.share
-        self.theta = z[..., -2:-1] + (problem.accumulate @ self.g[..., None])[..., 0]
+        self.theta = z[..., -2:-1] + problem.grid.integrate(self.g * dm)
         self.overburden = mass * m
         self.p = p = self.overburden + model.surface_stress
         #: P/p, which is 1 on the half-line
-        self.laden = self.overburden / p if model.surface_stress else np.ones_like(p)
+        self.overburden_fraction = self.overburden / p if model.surface_stress else np.ones_like(p)
         self.x = model.density_argument(p, self.theta)
         self.f, self.df = f, _ = model.closures(self.x)
         self.y = f[CONDUCTION] * self.g / mass
         self.s_p = 1.0 / (mass * dm)  # ds/dp
-        self.y_p = (self.y @ problem.grid.derivative.T) * self.s_p
+        self.y_p = problem.grid.differentiate(self.y) * self.s_p
         self.rise = p * self.g / mass - model.beta  # p dtheta/dp, less beta
         self.heating = self.rise + f[COUPLING] * (1.0 - self.rise)  # d ln T / d ln p
         self.net_loss = f[LOSS] - model.slope**2 * f[WORK]
@@ -131,9 +131,9 @@ class State:
     def jacobian(self) -> Array:
         """Derivative (n+2, n+3) of the residual with respect to z."""
         problem, model = self.problem, self.problem.model
-        f, df, p, y, laden = self.f, self.df, self.p, self.y, self.laden
+        f, df, p, y, overburden_fraction = self.f, self.df, self.p, self.y, self.overburden_fraction
         # d ln x / d ln M
-        raised = (1.0 + model.beta) * laden
+        by_mass = (1.0 + model.beta) * overburden_fraction
         n = p.shape[-1]
         nodes = np.arange(n)
         y_log_x = df[CONDUCTION] * self.g / self.mass
@@ -143,7 +143,7 @@ class State:
         np.multiply(-y_log_x[..., None], problem.accumulate, out=y_z[..., :n])
         y_z[..., nodes, nodes] += f[CONDUCTION] / self.mass
         y_z[..., n] = -y_log_x
-        y_z[..., n + 1] = y_log_x * raised - y
+        y_z[..., n + 1] = y_log_x * by_mass - y
         heating_log_x = df[COUPLING] * (1.0 - self.rise)
         by_log_x = 0.5 * y * heating_log_x - p * (df[LOSS] - model.slope**2 * df[WORK])
         by_rise = 0.5 * y * (1.0 - f[COUPLING])
@@ -157,21 +157,21 @@ class State:
         body[..., n + 1] += (
             (self.overburden - p) * self.y_p
             - self.overburden * self.net_loss
-            + by_log_x * raised
-            + by_rise * (laden - 1.0) * (self.rise + model.beta)
+            + by_log_x * by_mass
+            + by_rise * (overburden_fraction - 1.0) * (self.rise + model.beta)
         )
         out[..., 0, :] = y_z[..., 0, :]
         base = model.base_flux_slope(df[..., -1])
         out[..., -1, :] = y_z[..., -1, :]
         out[..., -1, :n] += base[..., None] * problem.accumulate[..., -1, :]
         out[..., -1, n] += base
-        out[..., -1, n + 1] -= base * raised[..., -1]
+        out[..., -1, n + 1] -= base * by_mass[..., -1]
         return out
 
     def macroscopic(self) -> Array:
         """ln Q, ln h, ln M and ln T_surface, (4,): (3.26) and (3.27) as integrals over the overburden."""
         mass = self.mass[..., 0]
-        flux, moment = self._slip + self._glide.sum(axis=-1), self._heights.sum(axis=-1)
+        flux, moment = self._slip + self._shear_flux.sum(axis=-1), self._heights.sum(axis=-1)
         return np.stack([np.log(flux), np.log(moment / mass), np.log(mass), self.surface], axis=-1)
 
     @property
@@ -184,20 +184,20 @@ class State:
         """Contributions of the nodes to the integral of P dz = (P/nu) dp."""
         model = self.problem.model
         if model.beta == 0.0:
-            lever = self.laden * np.exp(self.theta - self.f[DENSITY])
+            integrand = self.overburden_fraction * np.exp(self.theta - self.f[DENSITY])
         else:
-            lever = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
-        return self.problem.grid.weights * self.problem.share[1] * self.mass * lever
+            integrand = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
+        return self.problem.grid.weights * self.problem.share[1] * self.mass * integrand
 
     @cached_property
-    def _glide_per_work(self) -> Array:
+    def _shear_flux_per_work(self) -> Array:
         weights = self.problem.grid.weights * self.problem.share[1] * self.mass
         return weights * self.overburden * (self.problem.model.slope * np.exp(0.5 * self.log_t))
 
     @cached_property
-    def _glide(self) -> Array:
+    def _shear_flux(self) -> Array:
         """Contributions to the integral of P du, with du = s (g1/g2) sqrt(T) dp/nu (3.10)."""
-        return self._glide_per_work * self.f[WORK]
+        return self._shear_flux_per_work * self.f[WORK]
 
     @cached_property
     def _slip(self) -> Array:
@@ -207,29 +207,29 @@ class State:
 
     def macroscopic_gradient(self) -> Array:
         """Derivative (4, n+3) of :meth:`macroscopic` with respect to z."""
-        model, df, laden = self.problem.model, self.df, self.laden
+        model, df, overburden_fraction = self.problem.model, self.df, self.overburden_fraction
         n = self.p.shape[-1]
         root_t = 0.5 * (1.0 - df[GAMMA])  # d ln sqrt(T) / dtheta
-        heights, glide = self._heights, self._glide
-        work_part = self._glide_per_work * df[WORK]
-        flux = self._slip + glide.sum(axis=-1)
+        heights, shear_flux = self._heights, self._shear_flux
+        work_part = self._shear_flux_per_work * df[WORK]
+        flux = self._slip + shear_flux.sum(axis=-1)
         moment = heights.sum(axis=-1)
         slip_log_x = model.slip_slope(df[..., -1]) / model.slip(self.f[..., -1])
         end = self._slip / flux
         by_theta = np.empty((*self.p.shape[:-1], 2, n), dtype=self.dtype)
-        by_theta[..., 0, :] = (glide * root_t - work_part) / flux[..., None]
+        by_theta[..., 0, :] = (shear_flux * root_t - work_part) / flux[..., None]
         by_theta[..., 0, -1] += end * (root_t[..., -1] - slip_log_x)
         by_theta[..., 1, :] = heights * (1.0 + df[DENSITY]) / moment[..., None]
         out = np.zeros((*self.p.shape[:-1], 4, n + 2), dtype=self.dtype)
         out[..., :2, :n] = by_theta @ self.problem.accumulate
         out[..., :2, n] = by_theta.sum(axis=-1)
-        raised = (1.0 + model.beta) * laden
-        warmed = df[GAMMA] * raised - model.beta * laden  # d ln T / d ln M
-        glide_move = (glide * (2.0 + 0.5 * warmed) + work_part * raised).sum(axis=-1)
+        by_mass = (1.0 + model.beta) * overburden_fraction
+        warmed = df[GAMMA] * by_mass - model.beta * overburden_fraction  # d ln T / d ln M
+        shear_move = (shear_flux * (2.0 + 0.5 * warmed) + work_part * by_mass).sum(axis=-1)
         by_share = slip_log_x * (1.0 + model.beta) + 0.5 * (df[GAMMA][..., -1] * (1.0 + model.beta) - model.beta)
-        slip_move = 1.0 + by_share * laden[..., -1]
-        out[..., LOG_Q, n + 1] = glide_move / flux + end * slip_move
-        height_move = (heights * (2.0 - raised * (1.0 + df[DENSITY]))).sum(axis=-1)
+        slip_move = 1.0 + by_share * overburden_fraction[..., -1]
+        out[..., LOG_Q, n + 1] = shear_move / flux + end * slip_move
+        height_move = (heights * (2.0 - by_mass * (1.0 + df[DENSITY]))).sum(axis=-1)
         out[..., LOG_H, n + 1] = height_move / moment - 1.0
         out[..., LOG_M, n + 1] = 1.0
         out[..., LOG_T, n] = self.log_t_slope

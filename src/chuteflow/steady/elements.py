@@ -32,9 +32,9 @@ _PIECE, _PER_PIECE = 24, 6
 _GRADED = 0.5 ** np.arange(48, 0, -1.0)
 #: A piece of a grid is not shorter than this.
 _APART = 1e-6
-#: Elements at most, and pieces of a grid.
+#: Elements at most of the coarser mesh, and pieces of a grid: no more than elements of the finer mesh.
 MOST_ELEMENTS = 768
-MOST_PIECES = MOST_ELEMENTS // _PER_PIECE + 1
+MOST_PIECES = 2 * MOST_ELEMENTS
 
 
 def _gauss() -> tuple[Array, Array, Array, Array]:
@@ -125,7 +125,11 @@ class Elements:
         if pins.size:
             inner = np.unique(np.concatenate([inner[np.abs(inner[:, None] - pins).min(axis=1) > _APART], pins]))
         problem = Collocation(self.model, _PIECE, self.stretch, (0.0, *inner.tolist(), 1.0))
-        yield problem, self._unknowns(problem)[0]
+        yield problem, self.unknowns(problem)
+
+    def unknowns(self, problem: Collocation) -> Array:
+        """The unknowns on a Chebyshev grid of the same stretch."""
+        return self._unknowns(problem)[0]
 
     def _unknowns(self, problem: Collocation) -> tuple[Array, Array]:
         """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""
@@ -175,7 +179,7 @@ class Elements:
 
     def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
-        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is asked for."""
+        step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is requested."""
         ends, slopes = self.ends.copy(), self.slopes.copy()
         quantities, rates = np.full(4, np.nan), np.full(4, np.nan)
         errors = np.zeros((2 if rounding else 0, 4))

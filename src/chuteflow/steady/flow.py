@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from chuteflow import display
 from chuteflow.checks import number, real_array, whole
 from chuteflow.errors import InputError
-from chuteflow.numerics.chebyshev import Array, interpolation_matrix
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.roots import secants
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
@@ -30,7 +30,7 @@ from chuteflow.theory.constitutive import Law
 if TYPE_CHECKING:
     from chuteflow.steady.sensitivity import Sensitivity
 
-#: Share of the largest volume fraction that marks the depth in earlier studies (section 3.3).
+#: Fraction of the largest volume fraction that marks the depth in earlier studies (section 3.3).
 CUTOFF = 0.01
 #: Degree of the grid on which kinds (inverted, productive) are decided, if it is finer than the solution's.
 _SAMPLES = 96
@@ -42,7 +42,7 @@ _MOST_POINTS = 1_000_000
 _vanishing = np.errstate(under="ignore")
 #: Samples of an element, its ends among them.
 _WITHIN_ELEMENT = np.linspace(0.0, 1.0, 7)[:-1]
-#: Share P/M of the overburden above the highest point that is told from the far field.
+#: Share P/M of the overburden above the highest point that is distinguished from the far field.
 _SMALLEST_SHARE = 1e-260
 
 
@@ -210,7 +210,7 @@ class Flow(Result):
 
     @cached_property
     def _share_above_depth(self) -> float:
-        """Share of the mass hold-up above the depth: 0 where that is the height of the interface."""
+        """Fraction of the mass hold-up above the depth: 0 where that is the height of the interface."""
         target = np.log(CUTOFF * self.largest_volume_fraction)
         if self._model.surface_stress and self._log_density(0.0) >= target:
             return 0.0
@@ -267,7 +267,7 @@ class Flow(Result):
 
     @cached_property
     def net_loss_range(self) -> tuple[float, float]:
-        """Smallest and largest dissipation less production over nu p sqrt(T) in the flow."""
+        """Smallest and largest dissipation minus production over nu p sqrt(T) in the flow."""
         net = self._samples["net"]
         return float(net.min()), float(net.max())
 
@@ -301,15 +301,15 @@ class Flow(Result):
     def energy_budget(self) -> EnergyBudget:
         """Where fluctuation energy comes from and goes to, in the whole flow."""
         problem, state, model = self.solution.problem, self._state, self._model
-        pace = state.p * np.exp(0.5 * state.log_t)  # p sqrt(T)
-        per_node = problem.grid.weights / state.s_p * pace
+        flux_scale = state.p * np.exp(0.5 * state.log_t)  # p sqrt(T)
+        per_node = problem.grid.weights / state.s_p * flux_scale
         slip_work = model.slope * float(state.p[-1]) * self.slip_velocity
         return EnergyBudget(
             slip_work=slip_work,
-            base_loss=slip_work - float(model.base_flux(state.f[:, -1]) * pace[-1]),
+            base_loss=slip_work - float(model.base_flux(state.f[:, -1]) * flux_scale[-1]),
             shear_work=model.slope**2 * float(per_node @ state.f[WORK]),
             dissipation=float(per_node @ state.f[LOSS]),
-            heat_through_surface=model.surface_flux * float(pace[0]),
+            heat_through_surface=model.surface_flux * float(flux_scale[0]),
         )
 
     def profile(self, z: ArrayLike) -> Profile:
@@ -330,11 +330,11 @@ class Flow(Result):
         """All fields where ``share`` (array, above 0 and at most 1) of the mass hold-up lies above, exactly there.
 
         Raises:
-            InputError: for a share out of range.
+            InputError: for a fraction out of range.
         """
         share = real_array("share", share)
         if not (share.size and share.min() > 0.0 and share.max() <= 1.0):
-            raise InputError("shares of the overburden must be above 0 (surface) and at most 1 (base)")
+            raise InputError("fractions of the overburden must be above 0 (surface) and at most 1 (base)")
         return Profile(height=self._heights(share), **self._fields(share))
 
     def sampled(self, points: int = 201, top: float | None = None) -> Profile:
@@ -372,12 +372,10 @@ class Flow(Result):
 
     @_vanishing
     def _at_share(self, share: Array) -> tuple[dict[str, Array], Array]:
-        """Potential, gradient, closures and density at shares m = P/M of the overburden."""
+        """Potential, gradient, closures and density at fractions m = P/M of the overburden."""
         problem, state = self.solution.problem, self._state
         s = stretch_position(share, problem.stretch)
-        matrix = interpolation_matrix(problem.grid, s)
-        g = matrix @ state.g
-        theta = matrix @ state.theta
+        theta, g = problem.grid.interpolate(np.stack([state.theta, state.g]), s)
         return self._pointwise(state.mass * share + self._model.surface_stress, theta, g)
 
     def _pointwise(self, p: Array, theta: Array, g: Array) -> tuple[dict[str, Array], Array]:
@@ -399,12 +397,12 @@ class Flow(Result):
 
     @cached_property
     def _samples(self) -> dict[str, Array]:
-        """What kinds are told from, see :func:`_samples_of`."""
+        """What kinds are distinguished from, see :func:`_samples_of`."""
         return _samples_of(self._state)
 
     @cached_property
     def _share_of_largest(self) -> Array:
-        """Share of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
+        """Fraction of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
         # Where grains are packed almost densest, samples alone do not tell.
         return max(self._largest_sampled(), np.ones(1), key=lambda share: self._log_density(float(share[0])))
 
@@ -441,17 +439,16 @@ class Flow(Result):
         elif self._model.surface_stress == 0.0:
             regular = np.empty_like(span)
             regular[1:] = (per_fall[1:] - per_fall[0]) / state.p[1:] * span[1:]
-            regular[0] = g.derivative[0] @ per_fall
+            regular[0] = g.differentiate(per_fall)[0]
         else:
             regular = per_fall / state.p * span
-        glide = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
-        height = g.integral @ regular
-        velocity = g.integral @ glide
+        shear_rate = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
+        height, velocity = g.integrate(np.stack([regular, shear_rate]))
         return height[-1] - height, self._slip + velocity[-1] - velocity
 
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
-        z = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[0]
+        z = self.solution.problem.grid.interpolate(self._antiderivatives[0], s)
         if self._model.unlimited:
             beta, mass = self._model.beta, self._state.mass[0]
             powers = (mass * np.maximum(share, _SMALLEST_SHARE)) ** -beta - mass**-beta
@@ -461,7 +458,7 @@ class Flow(Result):
         return z
 
     def _shares_at(self, z: Array) -> Array:
-        """Shares of the overburden at heights z. Those of the last heights are kept: fields, their derivatives in
+        """Fractions of the overburden at heights z. Those of the last heights are kept: fields, their derivatives in
         height and those with respect to parameters are asked for at the same ones."""
         kept: tuple[Array, Array] | None = self.__dict__.get("_last_shares")
         if kept is None or not np.array_equal(kept[0], z):
@@ -472,18 +469,18 @@ class Flow(Result):
 
     @_vanishing
     def _found_shares(self, z: Array) -> Array:
-        """Shares of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
+        """Fractions of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
-        knots = self._samples["share"].copy()
+        samples = self._samples["share"].copy()
         if p_s == 0.0:
-            knots[0] = _SMALLEST_SHARE
-        log_p = np.interp(z, self._heights(knots)[::-1], np.log(state.mass * knots + p_s)[::-1])
-        low, high = np.log(state.mass * knots[0] + p_s), np.log(state.mass + p_s)
+            samples[0] = _SMALLEST_SHARE
+        log_p = np.interp(z, self._heights(samples)[::-1], np.log(state.mass * samples + p_s)[::-1])
+        low, high = np.log(state.mass * samples[0] + p_s), np.log(state.mass + p_s)
         for _ in range(60):
             share = np.clip((np.exp(log_p) - p_s) / state.mass, 0.0, 1.0)
             fields, _ = self._at_share(share)
-            pace = np.exp(log_p) / fields["nu"]
-            move = np.clip((self._heights(share) - z) / pace, -50.0, 50.0)
+            height_rate = np.exp(log_p) / fields["nu"]
+            move = np.clip((self._heights(share) - z) / height_rate, -50.0, 50.0)
             log_p = np.clip(log_p + move, low, high)
             if np.abs(move).max(initial=0.0) < 1e-13 * max(1.0, float(np.abs(log_p).max(initial=0.0))):
                 break
@@ -492,7 +489,7 @@ class Flow(Result):
     @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
         s = stretch_position(share, self.solution.problem.stretch)
-        velocity = interpolation_matrix(self.solution.problem.grid, s) @ self._antiderivatives[1]
+        velocity = self.solution.problem.grid.interpolate(self._antiderivatives[1], s)
         return self._local(*self._at_share(share)) | {"velocity": velocity}
 
     def _local(self, at: dict[str, Array], f: Array) -> dict[str, Array]:
@@ -548,11 +545,11 @@ def rough_kinds(solutions: Sequence[Solution]) -> Array:
 
 @_vanishing
 def _samples_of(state: State) -> dict[str, Array]:
-    """Share of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
+    """Fraction of the overburden, nu, p dtheta/dp and net loss on a fine grid, each (..., nodes)."""
     problem = state.problem
-    fine, matrix = problem.transferred(max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
+    fine = replace(problem, degree=max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
-    nu, rise, net = nodal @ matrix.T
+    nu, rise, net = problem.grid.interpolate(nodal, fine.grid.nodes)
     return {"share": fine.share[0], "nu": nu, "rise": rise, "net": net}
 
 

@@ -19,7 +19,7 @@ from chuteflow.theory.bases import base
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.laws import law, settings_added
 
-#: Where a parameter may lie, and between which values it is looked for, by the last part of its name.
+#: Where a parameter may lie, and between which values it is searched for, by the last part of its name.
 _RANGES = {
     "closure.packing": ((0.5, 0.74048), (0.58, 0.68)),
     "closure.friction": ((0.0, 2.0), (0.0, 0.4)),
@@ -45,8 +45,8 @@ _LATEX = {
 class FreeParameter:
     """A number of a chute that can be varied.
 
-    ``key`` is what it is called; it lies from ``low`` to ``high``, and is looked for in ``likely`` unless another range
-    is given.
+    ``key`` is what it is called; it lies from ``low`` to ``high``, and is searched for in ``likely`` unless another
+    range is given.
     """
 
     key: str
@@ -94,7 +94,7 @@ class FreeParameter:
 
 
 def _configured(chosen: Law, name: str, value: float) -> Law:
-    """A law with another value of one parameter, each said once in the text by which it is asked for."""
+    """A law with another value of one parameter, each said once in the text by which it is requested."""
     text = str(chosen)
     try:
         known = law(text) == chosen
@@ -146,7 +146,7 @@ def free_parameter(chute: Chute, asked: str) -> FreeParameter:
 def chosen_parameters(
     chute: Chute, free: Sequence[str], ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[FreeParameter, ...]:
-    """The parameters of ``chute`` called ``free``, to be looked for in the ``ranges`` that are given by name.
+    """The parameters of ``chute`` called ``free``, to be searched for in the ``ranges`` that are given by name.
 
     Raises:
         InputError: for an unknown name, one that is there twice, or a range that is not allowed.

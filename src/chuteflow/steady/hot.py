@@ -169,7 +169,7 @@ _PSI, _TAU, _FLUX, _SHEAR, _HOLDUP, _SHEARED, _MOMENT = range(7)
 
 
 @dataclass(frozen=True, eq=False)
-class Shot:
+class ShootingSolution:
     """The reduced system integrated from the surface to the base, where (4.13) holds.
 
     ``log_c`` is ln |c| of (4.24). ``psi``, ``tau`` and ``U`` are arrays of the shape of ``s``. ``flux``
@@ -196,7 +196,7 @@ class Shot:
         return math.copysign(math.exp(self.log_c) if self.log_c < 709.0 else math.inf, self.lambda_)
 
 
-def shoot(lambda_: float, mu: float = 0.0, s: ArrayLike | None = None, tolerance: float = 1e-12) -> Shot:
+def shoot(lambda_: float, mu: float = 0.0, s: ArrayLike | None = None, tolerance: float = 1e-12) -> ShootingSolution:
     """Solve (4.11)-(4.13), (4.16) and (4.17) as the paper does: by a Runge-Kutta method, from (4.24) on.
 
     The paper adjusts c until (4.13) holds at s = 1. As sigma = ln s does not appear in the system, c shifts
@@ -220,7 +220,7 @@ def shoot(lambda_: float, mu: float = 0.0, s: ArrayLike | None = None, tolerance
     rough = _Trajectory.to_base(lambda_, 3.0 * _START, 30.0 * tolerance)
     numbers = fine.macroscopic(mu)
     state = fine.states(fine.end + np.log(s))
-    return Shot(
+    return ShootingSolution(
         lambda_=lambda_,
         log_c=fine.end,
         s=s,

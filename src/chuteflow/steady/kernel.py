@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.compiled import compiled
-from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, GRIP, LOSS, OFFSET, SHEAR, UPPER, WORK
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, OFFSET, SHEAR, UPPER, WALL_SHEAR, WORK
 
 #: Gauss points of an element.
 STAGES = 7
@@ -30,7 +30,7 @@ _LONGEST, _HALVINGS = 2.0, 8
 def closures(table: Any, x: float, f: Any) -> None:
     """The closures at x and their derivatives with respect to ln x, into ``f`` (16,).
 
-    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.Table`.
+    ``table`` holds the coefficients and the edges of a :class:`chuteflow.numerics.tabulate.FunctionTable`.
     """
     coefficients, edges = table
     degree, pieces, width = coefficients.shape
@@ -102,7 +102,7 @@ def _assemble(
     """Residuals and derivatives of all elements, condensed; the macroscopic quantities and their derivatives.
 
     ``chute`` holds slope, p_S, y_S, base loss, the three coefficients of the slip, beta and
-    the factor of GRIP in the loss; ``ends`` (N+1, 2) theta
+    the factor of WALL_SHEAR in the loss; ``ends`` (N+1, 2) theta
     and y; ``slopes`` (N, STAGES, 2). Fills ``local`` (N, 2 STAGES, 4): the change of the slopes for changes of theta,
     y and mu, and by Newton's method; ``quantities`` (4,) ln Q, ln h, ln M, ln T; ``by_ends`` (2, N+1, 3) derivatives of
     ln Q and ln h with respect to theta at the ends and mu (in the first row), ``by_slopes`` (2, N, STAGES) those with
@@ -117,7 +117,7 @@ def _assemble(
     f = np.empty(16)
     matrix = np.empty((2 * STAGES, 2 * STAGES))
     worst = 0.0
-    moment = glide = moment_mu = glide_mu = 0.0
+    moment = shear_flux = moment_mu = shear_flux_mu = 0.0
     jac = np.empty((STAGES, 2, 2))
     for e in range(count):
         h = breaks[e + 1] - breaks[e]
@@ -175,12 +175,12 @@ def _assemble(
             root_t = math.exp(0.5 * log_t)
             shear = weight * over * slope * f[WORK] * root_t
             moment += heights
-            glide += shear
+            shear_flux += shear
             density_x, work_x, gamma_x = f[8 + DENSITY], f[8 + WORK] / f[WORK], f[8 + GAMMA]
             by_slopes[1, e, j] = heights * (1.0 + density_x)
             by_slopes[0, e, j] = shear * (0.5 * (1.0 - gamma_x) - work_x)
             moment_mu += heights * (2.0 - (1.0 + density_x) * rho * q)
-            glide_mu += shear * (2.0 + (0.5 * (gamma_x * rho - beta) + work_x * rho) * q)
+            shear_flux_mu += shear * (2.0 + (0.5 * (gamma_x * rho - beta) + work_x * rho) * q)
         for j in range(STAGES):
             for i in range(STAGES):
                 for c in range(2):
@@ -194,22 +194,22 @@ def _assemble(
     p = mass + p_s
     q = mass / p
     closures(table, density_argument(p, ends[count, 0], beta), f)
-    slip = chute[4] + chute[5] * f[SHEAR] + chute[6] * f[GRIP]
-    slip_x = (chute[5] * f[8 + SHEAR] + chute[6] * f[8 + GRIP]) / slip
+    slip = chute[4] + chute[5] * f[SHEAR] + chute[6] * f[WALL_SHEAR]
+    slip_x = (chute[5] * f[8 + SHEAR] + chute[6] * f[8 + WALL_SHEAR]) / slip
     log_t = ends[count, 0] + f[GAMMA]
     if beta != 0.0:
         log_t -= beta * math.log(p)
     carried = slip * math.exp(0.5 * log_t) * mass
-    flux = carried + glide
+    flux = carried + shear_flux
     if not (flux > 0.0 and moment > 0.0):
         return math.inf
     by_ends[0, count, 2] = (
-        slope * slip - chute[3] - chute[8] * f[GRIP]
+        slope * slip - chute[3] - chute[8] * f[WALL_SHEAR]
     )  # heat flux that the base gives, and its derivative to ln x
-    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + GRIP]
+    by_ends[1, count, 2] = slope * slip * slip_x - chute[8] * f[8 + WALL_SHEAR]
     by_ends[0, count, 0] = carried * (0.5 * (1.0 - f[8 + GAMMA]) - slip_x) / flux
     by_ends[1, count, 0] = 0.0
-    by_ends[0, 0, 2] = (glide_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
+    by_ends[0, 0, 2] = (shear_flux_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
     by_ends[1, 0, 2] = moment_mu / moment - 1.0
     by_slopes[0] /= flux
     by_slopes[1] /= moment

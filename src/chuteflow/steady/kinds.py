@@ -22,7 +22,7 @@ def density_kind(steepest_rise: float) -> str:
 
 
 def interior_kind(smallest: float, largest: float, rounding: float = 0.0) -> str:
-    """One of INTERIORS, by the smallest and largest net loss of fluctuation energy, dissipation less production;
+    """One of INTERIORS, by the smallest and largest net loss of fluctuation energy, dissipation minus production;
     a loss or gain within ``rounding`` of zero decides nothing."""
     if smallest >= -rounding:
         return DISSIPATIVE

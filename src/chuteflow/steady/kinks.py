@@ -65,8 +65,8 @@ def with_ends(flow: Elements, places: Array) -> Elements:
 
 
 def _log_x(flow: Elements, s: Array) -> Array:
-    share, _ = stretch_map(s, flow.stretch)
-    p = np.exp(flow.log_mass) * share + flow.model.surface_stress
+    fraction, _ = stretch_map(s, flow.stretch)
+    p = np.exp(flow.log_mass) * fraction + flow.model.surface_stress
     return (1.0 + flow.model.beta) * np.log(np.maximum(p, 1e-300)) - flow.at(s)[:, 0]
 
 

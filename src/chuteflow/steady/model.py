@@ -31,16 +31,16 @@ import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
-from chuteflow.numerics.tabulate import Array, Table, antiderivative, tabulate
+from chuteflow.numerics.tabulate import Array, FunctionTable, antiderivative, tabulate
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
-from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.theory.bases import BASES, BaseCondition, base
 from chuteflow.theory.constitutive import Law, dilute_drift, reduce, require_positive
 
-#: Order of the functions of x in a table of closures: a, k, loss, work, shear and grip as above and in
+#: Order of the functions of x in a table of closures: a, k, loss, work, shear and wall_shear as above and in
 #: :class:`chuteflow.theory.constitutive.Reduced`; DENSITY ln(nu/x); GAMMA.
-CONDUCTION, COUPLING, LOSS, WORK, SHEAR, GRIP, DENSITY, GAMMA = range(8)
+CONDUCTION, COUPLING, LOSS, WORK, SHEAR, WALL_SHEAR, DENSITY, GAMMA = range(8)
 
 # Tables run over c = ln(1 + ln(1 + x/OFFSET)): linear in x where dilute, the dense range in few pieces.
 OFFSET = 0.2
@@ -60,14 +60,14 @@ def _argument(c: Array) -> Array:
     return OFFSET * np.expm1(np.expm1(c))
 
 
-def closure_table(closure: Law, e: float, slope: float, on: Base = BASES["richman"]) -> Table:
+def closure_table(closure: Law, e: float, slope: float, on: BaseCondition = BASES["richman"]) -> FunctionTable:
     """The eight functions of x for ``closure``; the two of the base for that of the kind of ``on``."""
     return _closure_table(closure, e, slope if closure.knows_slope else 0.0, BASES[on.name])
 
 
 # Keyed by the law itself: another may be registered under its name at any time.
 @lru_cache(maxsize=32)
-def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
+def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> FunctionTable:
     b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
     scaled_breaks = np.array([nu / (1.0 - nu / np.real(chosen.densest)) for nu in breaks])
@@ -92,14 +92,14 @@ def _closure_table(chosen: Law, e: float, slope: float, on: Base) -> Table:
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
 
 
-def evaluate_closures(table: Table, x: Array) -> tuple[Array, Array]:
+def evaluate_closures(table: FunctionTable, x: Array) -> tuple[Array, Array]:
     """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape."""
     inner = np.log1p(x * (1.0 / OFFSET))
     values, slopes = table(np.log1p(inner))
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence[float]) -> Table:
+def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence[float]) -> FunctionTable:
     """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
     ``breaks`` are places where the law is not smooth."""
 
@@ -123,12 +123,12 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
 
 
-def _invert(density: Table, x: Array) -> Array:
+def _invert(density: FunctionTable, x: Array) -> Array:
     """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
     log_x = np.log(np.maximum(x, 1e-300))
-    knots = _argument(np.linspace(1e-9, UPPER, 400))
-    (log_ratio, _), _ = density(_coordinate(knots))
-    log_scaled = np.interp(log_x, np.log(knots) + log_ratio.real, np.log(knots))
+    samples = _argument(np.linspace(1e-9, UPPER, 400))
+    (log_ratio, _), _ = density(_coordinate(samples))
+    log_scaled = np.interp(log_x, np.log(samples) + log_ratio.real, np.log(samples))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
     for _ in range(3):
         scaled = np.exp(log_scaled)
@@ -149,10 +149,10 @@ class Model:
     law: Law
     slope: float
     roughness: float
-    table: Table
+    table: FunctionTable
     surface_stress: float
     surface_flux: float
-    base: Base
+    base: BaseCondition
     base_loss: float
     loss_by_second: float
     slip_of_empty_base: float
@@ -179,7 +179,7 @@ class Model:
 
     def slip(self, closures: Array) -> Array:
         """F1 of (3.16)."""
-        return self.base.slip(closures[SHEAR], closures[GRIP], self.roughness, self.slope)
+        return self.base.slip(closures[SHEAR], closures[WALL_SHEAR], self.roughness, self.slope)
 
     def slip_slope(self, slopes: Array) -> Array:
         """Derivative of F1, given those of the closures: F1 is affine in them."""
@@ -188,12 +188,12 @@ class Model:
     def base_flux(self, closures: Array) -> Array:
         """Heat flux y = q/(p sqrt(T)) that the base gives: s F1 - loss, which is F2/g1 of (3.18)."""
         flux = self.slope * self.slip(closures) - self.base_loss
-        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[GRIP]
+        return flux if self.loss_by_second == 0.0 else flux - self.loss_by_second * closures[WALL_SHEAR]
 
     def base_flux_slope(self, slopes: Array) -> Array:
         """Derivative of the flux that the base gives, given those of the closures: it is affine in them."""
         slope = self.slope * self.slip_slope(slopes)
-        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[GRIP]
+        return slope if self.loss_by_second == 0.0 else slope - self.loss_by_second * slopes[WALL_SHEAR]
 
     @cached_property
     def kinks(self) -> Array:
@@ -214,7 +214,7 @@ class Model:
         """Slope, p_S, y_S, base loss, the slip coefficient F1 as an affine function of the two functions of the base,
         beta, and the factor of the second function in the loss, (9,)."""
         unit = np.zeros((8, 2))
-        unit[SHEAR, 0] = unit[GRIP, 1] = 1.0
+        unit[SHEAR, 0] = unit[WALL_SHEAR, 1] = 1.0
         by_shear, by_grip = self.slip_slope(unit)
         return np.array(
             [
@@ -292,7 +292,7 @@ def _parameters(chute: Chute) -> dict[str, Any]:
     return {name: getattr(chute, name) for name in PARAMETERS}
 
 
-def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: Table, on: Base) -> Model:
+def _model(chute: Chute, chosen: Law, parameters: dict[str, Any], table: FunctionTable, on: BaseCondition) -> Model:
     slope, roughness = parameters["slope"], parameters["roughness"]
     loss, loss_by_second = on.loss(parameters["wall_restitution"], roughness)
     return Model(

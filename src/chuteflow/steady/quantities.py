@@ -183,7 +183,7 @@ BY_SYMBOL = {quantity.symbol: name for name, quantity in NUMBERS.items() if quan
 #: The numbers that place a flow on a curve.
 PLACE = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 
-#: Numbers that tell how far a flow keeps to the theory, attributes of :class:`chuteflow.steady.validity.Validity`.
+#: Numbers that show how far a flow keeps to the theory, attributes of :class:`chuteflow.steady.validity.Validity`.
 VALIDITY: dict[str, Quantity] = {
     q.name: q
     for q in (

@@ -44,15 +44,15 @@ _TURNS = 1e-6
 _SECANTS, _ASIDE = 3, 1e-3
 #: Positions of the conditions in m.
 WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
-#: What profiles are differentiated at: a fixed height above the base, or a fixed share of the mass above.
+#: What profiles are differentiated at: a fixed height above the base, or a fixed fraction of the mass above.
 COORDINATES = ("height", "overburden")
 
 
-class _Moved(Flow):
+class _PerturbedFlow(Flow):
     """A flow an imaginary step along a direction of its unknowns and parameters."""
 
     @classmethod
-    def along(cls, start: Flow, beyond: Model, direction: Array) -> _Moved:
+    def along(cls, start: Flow, beyond: Model, direction: Array) -> _PerturbedFlow:
         """``start`` with the problem ``beyond`` and its unknowns a step along ``direction``."""
         problem = replace(start.solution.problem, model=beyond)
         z: Any = stepped(start.solution.z, direction)
@@ -64,12 +64,12 @@ class _Moved(Flow):
         """Derivatives of ln Q, ln h, ln M and ln T_surface (4,)."""
         return derivative(self.solution.macroscopic)
 
-    def fields(self, share: Array) -> dict[str, Array]:
-        """Derivatives of the height and of all fields at shares (m,)."""
-        rates = {name: derivative(values) for name, values in self._fields(share).items()}
-        return {"height": derivative(self._heights(share)), **rates}
+    def fields(self, fraction: Array) -> dict[str, Array]:
+        """Derivatives of the height and of all fields at fractions (m,)."""
+        rates = {name: derivative(values) for name, values in self._fields(fraction).items()}
+        return {"height": derivative(self._heights(fraction)), **rates}
 
-    def numbers(self, start: _Start) -> dict[str, float]:
+    def numbers(self, start: _ReferenceFlow) -> dict[str, float]:
         """Derivatives of the numbers of the registry."""
         flow = start.flow
         log_q, log_h, log_m, log_t = self.place.tolist()
@@ -99,21 +99,23 @@ class _Moved(Flow):
         found["angle"] = float(derivative(np.arctan(np.complex128(self._model.slope)))) * 180.0 / np.pi
         return {name: float(found[name]) for name in NUMBERS}
 
-    def _depth(self, start: _Start, log_largest: float) -> tuple[float, float]:
-        """Derivatives of the depth, and of the share of the mass above it."""
-        share = np.array([start.above])
-        height = float(derivative(self._heights(share)[0]))
+    def _depth(self, start: _ReferenceFlow, log_largest: float) -> tuple[float, float]:
+        """Derivatives of the depth, and of the fraction of the mass above it."""
+        fraction = np.array([start.above])
+        height = float(derivative(self._heights(fraction)[0]))
         if start.above == 0.0:
             return height, 0.0
-        moved = float(derivative(np.log(self._at_share(share)[0]["nu"][0])))
-        pace = float(start.steepness(share)["volume_fraction"][0]) / float(start.fields(share)["volume_fraction"][0])
-        above = (log_largest - moved) / pace
-        return height + float(start.steepness(share)["height"][0]) * above, above
+        moved = float(derivative(np.log(self._at_share(fraction)[0]["nu"][0])))
+        log_slope = float(start.steepness(fraction)["volume_fraction"][0]) / float(
+            start.fields(fraction)["volume_fraction"][0]
+        )
+        above = (log_largest - moved) / log_slope
+        return height + float(start.steepness(fraction)["height"][0]) * above, above
 
 
 @dataclass(frozen=True, eq=False)
-class _Start:
-    """The flow itself, and how it changes with the share of the overburden."""
+class _ReferenceFlow:
+    """The flow itself, and how it changes with the fraction of the overburden."""
 
     flow: Flow
 
@@ -124,26 +126,26 @@ class _Start:
 
     @property
     def above(self) -> float:
-        """Share of the mass above the depth."""
+        """Fraction of the mass above the depth."""
         return self.flow._share_above_depth
 
     @cached_property
     def densest(self) -> Array:
-        """Share of the mass above the largest volume fraction (1,), to all digits.
+        """Fraction of the mass above the largest volume fraction (1,), to all digits.
 
         The density is flat there, and what it answers to a parameter is not.
         """
-        share = self.flow._share_of_largest
-        if not 0.0 < share[0] < 1.0:
-            return share
-        places = [float(share[0]) * (1.0 - _ASIDE), float(share[0])]
+        fraction = self.flow._share_of_largest
+        if not 0.0 < fraction[0] < 1.0:
+            return fraction
+        places = [float(fraction[0]) * (1.0 - _ASIDE), float(fraction[0])]
         values = [self._rise(place) for place in places]
         for _ in range(_SECANTS):
             if values[1] == values[0]:
                 break
             place = places[1] - values[1] * (places[1] - places[0]) / (values[1] - values[0])
             if not 0.0 < place < 1.0:
-                return share
+                return fraction
             places, values = [places[1], place], [values[1], self._rise(place)]
         return np.array([places[1]])
 
@@ -151,27 +153,27 @@ class _Start:
         """d ln nu/d ln p but for its sign and a positive factor."""
         return float(self.flow._at_share(np.array([place]))[0]["rise"][0]) - 1.0
 
-    def fields(self, share: Array) -> dict[str, Array]:
-        """All fields at shares (m,)."""
-        return self.flow._fields(share)
+    def fields(self, fraction: Array) -> dict[str, Array]:
+        """All fields at fractions (m,)."""
+        return self.flow._fields(fraction)
 
     def shares_at(self, z: Array) -> Array:
         """Shares (m,) at heights."""
         return self.flow._shares_at(z)
 
-    def steepness(self, share: Array) -> dict[str, Array]:
-        """Derivatives of the height and of all fields with respect to the share, at shares (m,)."""
+    def steepness(self, fraction: Array) -> dict[str, Array]:
+        """Derivatives of the height and of all fields with respect to the fraction, at fractions (m,)."""
         flow = self.flow
         state, problem = flow._state, flow.solution.problem
-        matrix = interpolation_matrix(problem.grid, stretch_position(share, problem.stretch))
+        matrix = interpolation_matrix(problem.grid, stretch_position(fraction, problem.stretch))
         theta, g = matrix @ state.theta, matrix @ state.g
         bend = matrix @ (problem.grid.derivative @ state.g / problem.share[1])
         mass = state.mass[0]
-        p = mass * share + flow._model.surface_stress
+        p = mass * fraction + flow._model.surface_stress
         local = flow._local(*flow._pointwise(stepped(p, mass), stepped(theta, g), stepped(g, bend)))
-        pace = -mass / np.real(local["volume_fraction"])  # dz/dshare
+        height_slope = -mass / np.real(local["volume_fraction"])  # dz/dshare
         rates = {name: derivative(values) for name, values in local.items()}
-        return rates | {"height": pace, "velocity": np.real(local["shear_rate"]) * pace}
+        return rates | {"height": height_slope, "velocity": np.real(local["shear_rate"]) * height_slope}
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +189,7 @@ class Sensitivity:
     at: str
     tangent: Array
     across: Array
-    _moved: tuple[_Moved, ...]
+    _moved: tuple[_PerturbedFlow, ...]
 
     def __repr__(self) -> str:
         said = ", ".join(self.keys)
@@ -233,7 +235,7 @@ class Sensitivity:
     def numbers_along(self) -> tuple[dict[str, float], dict[str, Array]]:
         """Derivatives of every number of the registry with respect to arclength along the branch, and with respect to
         each parameter (k,) across it: finite at folds."""
-        start = _Start(self.flow)
+        start = _ReferenceFlow(self.flow)
         with np.errstate(under="ignore"):
             along, *across = (moved.numbers(start) for moved in self._moved)
         return along, {name: np.array([one[name] for one in across]) for name in NUMBERS}
@@ -260,7 +262,7 @@ class Sensitivity:
         """Derivatives (k, m) of all fields of the registry at the fixed quantity.
 
         Args:
-            z: heights above the base (m,); with the coordinate "overburden" shares of the mass above, up to 1.
+            z: heights above the base (m,); with the coordinate "overburden" fractions of the mass above, up to 1.
             coordinate: what stays fixed at each point: "height", or "overburden", where the height itself changes.
 
         Raises:
@@ -287,12 +289,12 @@ class Sensitivity:
         at = real_array("z", z).ravel()
         by_height = coordinate == "height"
         self.flow.profile(at) if by_height else self.flow.at_overburden(at)  # raise where there is no flow
-        start = _Start(self.flow)
+        start = _ReferenceFlow(self.flow)
         with np.errstate(under="ignore"):
-            share = start.shares_at(at) if by_height else at
-            found = [moved.fields(share) for moved in self._moved]
+            fraction = start.shares_at(at) if by_height else at
+            found = [moved.fields(fraction) for moved in self._moved]
             if by_height:
-                found = [_at_height(rates, start.steepness(share)) for rates in found]
+                found = [_at_height(rates, start.steepness(fraction)) for rates in found]
         along, *across = found
         stacked = {name: np.array([rates[name] for rates in across]).reshape(-1, len(at)) for name in FIELDS}
         return along, stacked
@@ -325,15 +327,17 @@ class Sensitivity:
 
 
 def _at_height(rates: dict[str, Array], steep: dict[str, Array]) -> dict[str, Array]:
-    """Derivatives at fixed heights of what has ``rates`` at fixed shares: a height keeps its place as the share there
-    changes."""
-    share = -rates["height"] / steep["height"]
-    return {name: rates[name] + steep[name] * share if name != "height" else np.zeros_like(share) for name in FIELDS}
+    """Derivatives at fixed heights of what has ``rates`` at fixed fractions: a height keeps its place as the fraction
+    there changes."""
+    fraction = -rates["height"] / steep["height"]
+    return {
+        name: rates[name] + steep[name] * fraction if name != "height" else np.zeros_like(fraction) for name in FIELDS
+    }
 
 
 def slopes_in_height(flow: Flow, z: Array) -> dict[str, Array]:
     """Derivatives of all fields of ``flow`` with respect to height, at heights ``z`` (m,) that are in the flow."""
-    start = _Start(flow)
+    start = _ReferenceFlow(flow)
     with np.errstate(under="ignore"):
         steep = start.steepness(start.shares_at(z))
     return {name: values / steep["height"] for name, values in steep.items()}
@@ -370,11 +374,11 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
     across = np.empty((4, len(free)))
-    moved = [_Moved.along(flow, problem.model, ahead)]
+    moved = [_PerturbedFlow.along(flow, problem.model, ahead)]
     for j, one in enumerate(beyond):
         rate = derivative(states[j].macroscopic()) + gradient @ found[:, 1 + j]
         direction: Array = found[:, 1 + j] - ahead * float(tangent @ rate)
-        moved.append(_Moved.along(flow, one, direction))
+        moved.append(_PerturbedFlow.along(flow, one, direction))
         across[:, j] = moved[-1].place
     return Sensitivity(flow, free, condition, tangent, across, tuple(moved))
 

@@ -19,7 +19,7 @@ from chuteflow.steady.model import Model
 from chuteflow.theory.constitutive import Law
 from chuteflow.threads import on_one_thread
 
-#: Relative tolerance in Q, h and M unless another is asked for.
+#: Relative tolerance in Q, h and M by default.
 TOLERANCE = 1e-10
 #: Least error ever claimed, and factor by which rounding may do more than in the cases that are tried.
 _FLOOR, _SAFETY = 1e-12, 4.0
@@ -33,9 +33,13 @@ _MOST_ROUNDS = 12
 _STEEP = 1e-3
 #: A grid resolves a flow where its integrals agree to this.
 _AGREES = 1e-11
+#: Nodes of a grid in pieces up to which Newton's method is used on it: its time rises with their cube.
+_MOST_NODES = 800
+#: The elements are halved until the unknowns on such a grid change by less than this part of the largest.
+_SETTLED, _MOST_HALVINGS = 1e-11, 4
 
 
-class Status(Enum):
+class SolverStatus(Enum):
     """How a solution ended; each value is a sentence that says what to try."""
 
     CONVERGED = "converged"
@@ -45,7 +49,7 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Condition:
-    """Which flow of a family: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
+    """Which flow of a branch: ``weights`` . (ln Q, ln h, ln M, ln T_surface) = ``value``."""
 
     weights: tuple[float, float, float, float]
     value: float
@@ -74,14 +78,14 @@ class Solution:
 
     macroscopic: Array
     error: float
-    status: Status
+    status: SolverStatus
     source: Elements | tuple[Collocation, Array] | Law
     rates: Array | None = None
 
     @property
     def converged(self) -> bool:
         """Whether the tolerance was reached."""
-        return self.status is Status.CONVERGED
+        return self.status is SolverStatus.CONVERGED
 
     @cached_property
     def elements(self) -> Elements:
@@ -115,7 +119,7 @@ class Solution:
 
 
 def checked_tolerance(tolerance: float) -> float:
-    """A relative tolerance as it was given, once it is sure that it can be asked for.
+    """The relative tolerance, checked to be in the range allowed.
 
     Raises:
         InputError: if it is out of range.
@@ -144,8 +148,8 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     """The problem on a Chebyshev grid that resolves a solved flow, and its unknowns there.
 
     Newton's method on the grid, at the same hold-up, or beside a fold in it across the branch: profiles are then as
-    accurate as the integrals over the depth. Where not even the last grid resolves it, they have the digits of the
-    elements there.
+    accurate as the integrals over the depth. Where the grid would have too many nodes for that, the flow on elements is
+    refined. Where not even the last grid resolves it, profiles have the digits of the elements there.
     """
     rates = solution.rates
     weights = np.array([0.0, 0.0, 1.0, 0.0])
@@ -154,7 +158,7 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     value = float(weights @ solution.macroscopic)
     found, agrees = _on_grids(solution, weights, value)
     if not agrees and solution.error > TOLERANCE:
-        # A flow that was asked for roughly: between the ends of its elements it has fewer digits than its integrals.
+        # A flow that was requested roughly: between the ends of its elements it has fewer digits than its integrals.
         finer = solve(solution.elements.halved(), Condition(tuple(weights.tolist()), value), TOLERANCE)
         if finer.converged:
             found, _ = _on_grids(finer, weights, value)
@@ -167,16 +171,20 @@ def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[C
     agreed = resolved = False
     elements = solution.elements
     for problem, rough in elements.grids(kinks.crossings(elements)):
-        found = newton(
-            lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
-            rough,
-            tolerance=_STEP,
-            longest_step=2.0,
-        )
-        off = np.abs(problem.state(found.z).macroscopic() - solution.macroscopic)[:LOG_T].max()
-        agrees = found.converged and bool(off < max(_AGREES, solution.error))
+        if problem.grid.degree < _MOST_NODES:
+            found = newton(
+                lambda z, problem=problem: _system(problem.state(z), weights, np.array(value)),
+                rough,
+                tolerance=_STEP,
+                longest_step=2.0,
+            )
+            z, converged = found.z, found.converged
+        else:
+            z, converged = _on_finer_elements(elements, problem, weights, value)
+        off = np.abs(problem.state(z).macroscopic() - solution.macroscopic)[:LOG_T].max()
+        agrees = converged and bool(off < max(_AGREES, solution.error))
         if agrees or last is None:
-            last = problem, found.z if agrees else rough
+            last = problem, z if agrees else rough
         agreed |= agrees
         # One grid more than it takes for the integrals: profiles want it.
         if agrees and resolved:
@@ -184,6 +192,20 @@ def _on_grids(solution: Solution, weights: Array, value: float) -> tuple[tuple[C
         resolved = agrees
     assert last is not None
     return last, agreed
+
+
+def _on_finer_elements(elements: Elements, problem: Collocation, weights: Array, value: float) -> tuple[Array, bool]:
+    """The unknowns of a flow on the grid of ``problem``, from elements halved until they settle; whether they do."""
+    z = elements.unknowns(problem)
+    for _ in range(_MOST_HALVINGS):
+        finer = _iterated(elements.halved(), weights, value, _FINE_STEP)
+        if not np.isfinite(finer.step):
+            break
+        elements, before = finer.flow, z
+        z = elements.unknowns(problem)
+        if np.abs(z - before).max() < _SETTLED * np.abs(z).max():
+            return z, True
+    return z, False
 
 
 def _system(state: State, weights: Array, value: Array) -> tuple[Array, Array]:
@@ -213,11 +235,11 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
         change = float(np.abs(fine.quantities - coarse.quantities).max())
         noise = max(_FLOOR, _SAFETY * float(np.abs(fine.errors).max()))
         if change < max(tolerance, noise):
-            return Solution(fine.quantities, max(change, noise), Status.CONVERGED, fine.flow, fine.rates)
+            return Solution(fine.quantities, max(change, noise), SolverStatus.CONVERGED, fine.flow, fine.rates)
         if len(fine.flow.slopes) > MOST_ELEMENTS:
-            return Solution(fine.quantities, np.inf, Status.UNRESOLVED, fine.flow)
+            return Solution(fine.quantities, np.inf, SolverStatus.UNRESOLVED, fine.flow)
         coarse = fine
-    return Solution(np.full(4, np.nan), np.inf, Status.NO_CONVERGENCE, start)
+    return Solution(np.full(4, np.nan), np.inf, SolverStatus.NO_CONVERGENCE, start)
 
 
 def _iterated(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from chuteflow.theory.constitutive import CLUSTERED
 
-#: Share of the densest packing of the law above which contacts last.
+#: Fraction of the densest packing of the law above which contacts last.
 PACKED = 0.95
 #: Slip velocity over sqrt(T) at the base above which slip is large: Richman (1988) takes it to be small.
 SLIP = 1.0
@@ -37,7 +37,7 @@ WITHIN = "within the theory"
 class Validity:
     """What a flow is held against; all numbers are dimensionless.
 
-    ``largest_volume_fraction`` is nu_max and ``packing`` its share of the densest packing nu* of the law;
+    ``largest_volume_fraction`` is nu_max and ``packing`` its fraction of the densest packing nu* of the law;
     ``slip_ratio`` is the slip velocity over sqrt(T) at the base; ``knudsen_number`` the mean free path over the
     height of the centre of mass, the path being d/(6 sqrt(2) nu g0) with the mean of nu g0 over all grains;
     ``density_turns`` counts how often the density turns between rising and falling with height; ``dense_limit`` is the

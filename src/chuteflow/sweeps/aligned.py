@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class Aligned:
+class AlignedArrays:
     """Arrays whose first axis counts the same entries; those named in ``BY_COLUMN`` have them second, (rows, k)."""
 
     BY_COLUMN: ClassVar[tuple[str, ...]] = ()
@@ -20,7 +20,7 @@ class Aligned:
         """The entries ``which``, by a mask or by indices."""
         return self._made({name: of[:, which] if axis else of[which] for name, axis, of in self._arrays()})
 
-    def and_all(self, others: Sequence[Aligned]) -> Self:
+    def and_all(self, others: Sequence[AlignedArrays]) -> Self:
         """These entries, and after them those of the ``others``."""
         return self._made(
             {

@@ -1,12 +1,12 @@
 """Every flow of many chutes at a given flux, hold-up or centre of mass.
 
-# notation: column the trajectory of one chute from one surface temperature; its flows are counted from the
+# notation: a trajectory is that of one chute from one surface temperature; its flows are counted from the
 # surface down.
 
 The flows of one surface temperature alternate in the sign with which the heat flux passes that of the base, so that
-the k-th of one column goes over into the k-th of the next, unless two have met between them or one has left to
-large hold-ups. Columns are put where that is so, or where the quantity turns, near the value asked for, until
-every flow lies between two columns whose flows are known to go over into each other; there it is found as the
+the k-th of one trajectory goes over into the k-th of the next, unless two have met between them or one has left to
+large hold-ups. Trajectories are added where that is so, or where the quantity turns, near the requested value, until
+every flow lies between two trajectories whose flows are known to go over into each other; there it is found as the
 zero of one function of the surface temperature.
 """
 
@@ -20,47 +20,48 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.rough_turns import may_turn
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.roots import zeros
+from chuteflow.numerics.roots import find_zeros
 from chuteflow.parameters import DEEPEST, WIDEST
 from chuteflow.steady.collocation import LOG_M, LOG_T
-from chuteflow.sweeps.aligned import Aligned
-from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, flows_on, least_error, meets_base
+from chuteflow.sweeps.aligned import AlignedArrays
+from chuteflow.sweeps.bases import LADDER, SAFETY, Flows, evaluate_flows, least_error, meets_base
 from chuteflow.sweeps.batch import Batch, Indices
-from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
+from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
-#: Columns per decade of surface temperature to begin with.
+#: Trajectories per decade of surface temperature to begin with.
 _PER_DECADE = 4
-#: Accuracy of the columns, and for those whose first flow lies above the start.
+#: Accuracy of the trajectories, and for those whose first flow lies above the start.
 _ROUGH, _THIN = Accuracy(1e-5, 1e-2), Accuracy(1e-5, 1e-8)
-#: Flows kept of a column; a chute with more is left to the search by families.
+#: Flows kept of a trajectory; a chute with more is left to the search by branches.
 _MOST = 12
-#: Flows of two columns go over into each other if no logarithm differs by more than this, and this times ln T's.
+#: Flows of two trajectories go over into each other if no logarithm differs by more than this, and this times ln T's.
 _APART, _BY_TEMPERATURE = 0.3, 2.0
-#: Rounds of new columns. The few members that want more are searched one by one, which is cheaper by then.
+#: Rounds of new trajectories. The few members that want more are searched one by one, which is cheaper by then.
 _ROUNDS = 14
 #: The range is widened at most so often, where ln of the quantity rises at least with this power of T.
 _WIDENINGS, _LEADS = 4, 0.25
 #: Flows this near to the largest hold-up, in the logarithm, may lead beyond it, with at most this power of M.
 _AT_EDGE, _STEEPEST = 0.3, 4.0
-#: Columns reach to hold-ups a little beyond those asked for, so that no flow lies beside the last one.
+#: Trajectories reach to hold-ups a little beyond the requested ones, so that no flow lies beside the last one.
 _BEYOND = 1.1
 #: Where two flows meet, the value there lies within this many of their distances, this many steps in ln T beside, and
 #: a little.
 _ASIDE, _AWAY, _LITTLE = 1.0, 1.0, 1e-3
-#: Between columns a quantity departs from its values there by at most this part of what its slope changes over the
-#: step; and what rough columns may be off.
+#: Between trajectories a quantity departs from its values there by at most this part of what its slope changes over the
+#: step; and what rough trajectories may be off.
 _SAG, _NOISE = 0.5, 2e-5
-#: In steps of ln T narrower than this rough columns do not tell turns from noise: such members are searched one by one.
+#: In steps of ln T narrower than this rough trajectories do not tell turns from noise: such members are searched one by
+#: one.
 _NARROWEST = 1e-3
-#: A zero in ln T is known to this by rough columns, and the steps that finer ones then take at most.
+#: A zero in ln T is known to this by rough trajectories, and the steps that finer ones then take at most.
 _NEAR, _MOST_STEPS = 1e-7, 6
-#: A flow meets the value asked for to this.
+#: A flow meets the requested value to this.
 _MEETS = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
-class Columns(Aligned):
-    """Columns in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
+class ScannedFlows(AlignedArrays):
+    """Trajectories in order of members and temperature: ``member`` and ``log_t`` (c,), how many flows each has (c,), -1
     where that is not known, and ``flows`` (c, _MOST, 3), their ln Q, ln h and ln M, NaN where there is none."""
 
     member: Indices
@@ -68,20 +69,20 @@ class Columns(Aligned):
     count: Indices
     flows: Array
 
-    def joined(self, other: Columns) -> Columns:
+    def joined(self, other: ScannedFlows) -> ScannedFlows:
         """Both in order."""
         both = self.and_all([other])
         return both.take(np.lexsort((both.log_t, both.member)))
 
-    def of(self, members: NDArray[np.bool_]) -> Columns:
-        """The columns of some members."""
+    def of(self, members: NDArray[np.bool_]) -> ScannedFlows:
+        """The trajectories of some members."""
         return self.take(members[self.member])
 
 
 @dataclass(frozen=True, eq=False)
-class Brackets(Aligned):
-    """Flows that lie between two columns: ``member``, ``place`` among the flows from the surface, ends in ln T and the
-    ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
+class Brackets(AlignedArrays):
+    """Flows that lie between two trajectories: ``member``, ``place`` among the flows from the surface, ends in ln T and
+    the ln of the quantity over its value there, and the largest ``hold_up`` at the ends; (b,) each."""
 
     member: Indices
     place: Indices
@@ -94,7 +95,7 @@ class Brackets(Aligned):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The chutes, the quantity asked for by its place in the macroscopic ones, ln of its values (n,), and the ends of
+    """The chutes, the requested quantity by its place in the macroscopic ones, ln of its values (n,), and the ends of
     the members."""
 
     batch: Batch
@@ -103,8 +104,8 @@ class Problem:
     ends: Ends
     deepest: Array
 
-    def columns(self, member: Indices, log_t: Array) -> Columns:
-        """Rough columns of ``member`` (c,) at ``log_t`` (c,)."""
+    def trajectories(self, member: Indices, log_t: Array) -> ScannedFlows:
+        """Rough trajectories of ``member`` (c,) at ``log_t`` (c,)."""
         found, trouble = self._marched(member, log_t, _ROUGH)
         again = np.flatnonzero(trouble)
         if again.size:
@@ -118,15 +119,15 @@ class Problem:
         flows = np.full((member.size, _MOST, 3), np.nan)
         flows[found.member[kept], place[kept]] = found.macroscopic[:LOG_T, kept].T
         count[trouble | (count > _MOST)] = -1
-        return Columns(member, log_t, count, flows)
+        return ScannedFlows(member, log_t, count, flows)
 
     def _marched(self, member: Indices, log_t: Array, accuracy: Accuracy) -> tuple[Flows, NDArray[np.bool_]]:
         some, temperature = self.batch.take(member), np.exp(log_t)
         found = march(some, temperature, self.ends.take(member), accuracy, meets_base)
-        return flows_on(some, temperature, found), found.trouble
+        return evaluate_flows(some, temperature, found), found.trouble
 
 
-def at_quantity(
+def solve_at_quantity(
     batch: Batch,
     which: int,
     value: Array,
@@ -145,81 +146,83 @@ def at_quantity(
     low, high = np.log(surface_temperature)
     many = max(int(np.ceil((high - low) / np.log(10.0) * _PER_DECADE)), 2) + 1
     members = np.arange(len(batch))
-    columns = problem.columns(np.repeat(members, many), np.tile(np.linspace(low, high, many), len(batch)))
+    trajectories = problem.trajectories(np.repeat(members, many), np.tile(np.linspace(low, high, many), len(batch)))
     for edge in (1, -1):
-        columns = _widened(problem, columns, edge)
+        trajectories = _widened(problem, trajectories, edge)
     unsettled = np.zeros(len(batch), dtype=bool)
     brackets: list[Brackets] = []
     for _ in range(_ROUNDS):
-        unsettled[columns.member[columns.count < 0]] = True
-        unsettled[columns.member[_deeper(problem, columns)]] = True
-        columns = columns.of(~unsettled)
-        found, split, lost = _links(problem, columns)
-        unsettled[columns.member[lost]] = True
+        unsettled[trajectories.member[trajectories.count < 0]] = True
+        unsettled[trajectories.member[_deeper(problem, trajectories)]] = True
+        trajectories = trajectories.of(~unsettled)
+        found, split, lost = _links(problem, trajectories)
+        unsettled[trajectories.member[lost]] = True
         # A member is done when none of its gaps is split.
         ready = np.ones(len(batch), dtype=bool)
-        ready[columns.member[split]] = False
+        ready[trajectories.member[split]] = False
         ready &= ~unsettled
         brackets.append(found.take(ready[found.member]))
         going = ~ready & ~unsettled
-        if not going[columns.member].any():
-            columns = columns.of(going)
+        if not going[trajectories.member].any():
+            trajectories = trajectories.of(going)
             break
-        split = split[going[columns.member[split]]]
-        middle = 0.5 * (columns.log_t[split] + columns.log_t[split + 1])
-        columns = columns.joined(problem.columns(columns.member[split], middle)).of(going)
-    unsettled[columns.member] = True
+        split = split[going[trajectories.member[split]]]
+        middle = 0.5 * (trajectories.log_t[split] + trajectories.log_t[split + 1])
+        trajectories = trajectories.joined(problem.trajectories(trajectories.member[split], middle)).of(going)
+    unsettled[trajectories.member] = True
     flows, failed = _found(problem, brackets[0].and_all(brackets[1:]), tolerance)
     unsettled |= failed
     inside = (flows.macroscopic[LOG_M] <= problem.deepest[flows.member]) & ~unsettled[flows.member]
     return Flows.joined([flows.take(inside)]), unsettled
 
 
-def _widened(problem: Problem, columns: Columns, edge: int) -> Columns:
-    """With columns beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the range
-    towards the value asked for, as :func:`chuteflow.flows` has it."""
+def _widened(problem: Problem, trajectories: ScannedFlows, edge: int) -> ScannedFlows:
+    """With trajectories beyond the hottest (``edge`` 1) or coldest (-1) of each member, where flows lead out of the
+    range towards the requested value, as :func:`chuteflow.flows` has it."""
     for _ in range(_WIDENINGS):
-        ends = np.flatnonzero(np.diff(columns.member, append=-1) if edge > 0 else np.diff(columns.member, prepend=-1))
+        ends = np.flatnonzero(
+            np.diff(trajectories.member, append=-1) if edge > 0 else np.diff(trajectories.member, prepend=-1)
+        )
         before = ends - edge
-        a, b = columns.flows[before], columns.flows[ends]
-        run = (columns.log_t[ends] - columns.log_t[before])[:, None]
-        left = problem.target[columns.member[ends], None] - b[..., problem.which]
+        a, b = trajectories.flows[before], trajectories.flows[ends]
+        run = (trajectories.log_t[ends] - trajectories.log_t[before])[:, None]
+        left = problem.target[trajectories.member[ends], None] - b[..., problem.which]
         alike = (np.abs(a - b) <= _APART + _BY_TEMPERATURE * np.abs(run)[..., None]).all(axis=-1)
         slope = (b - a)[..., problem.which] / run
         with np.errstate(invalid="ignore"):
             leads = alike & (slope * np.sign(left) * edge > _LEADS)
             reach = np.where(leads, 1.2 * np.abs(left / slope) + 1.0, 0.0).max(axis=1)
         limit = np.log(WIDEST[edge > 0])
-        reach = np.minimum(reach, np.maximum(edge * (limit - columns.log_t[ends]), 0.0))
+        reach = np.minimum(reach, np.maximum(edge * (limit - trajectories.log_t[ends]), 0.0))
         many = np.ceil(reach / np.log(10.0) * _PER_DECADE).astype(np.intp)
         if not many.any():
             break
         which = np.repeat(np.arange(ends.size), many)
         fraction = (np.arange(which.size) - (np.cumsum(many) - many)[which] + 1) / many[which]
-        new = columns.log_t[ends[which]] + edge * reach[which] * fraction
-        columns = columns.joined(problem.columns(columns.member[ends[which]], new))
-    return columns
+        new = trajectories.log_t[ends[which]] + edge * reach[which] * fraction
+        trajectories = trajectories.joined(problem.trajectories(trajectories.member[ends[which]], new))
+    return trajectories
 
 
-def _deeper(problem: Problem, columns: Columns) -> NDArray[np.bool_]:
-    """The columns with flows near the largest hold-up that may lead beyond it, to the value asked for."""
-    log_m, target = columns.flows[..., LOG_M], problem.target[columns.member, None]
-    left = target - columns.flows[..., problem.which]
+def _deeper(problem: Problem, trajectories: ScannedFlows) -> NDArray[np.bool_]:
+    """The trajectories with flows near the largest hold-up that may lead beyond it, to the requested value."""
+    log_m, target = trajectories.flows[..., LOG_M], problem.target[trajectories.member, None]
+    left = target - trajectories.flows[..., problem.which]
     with np.errstate(invalid="ignore"):
-        at_edge = log_m > problem.deepest[columns.member, None] - _AT_EDGE
+        at_edge = log_m > problem.deepest[trajectories.member, None] - _AT_EDGE
         within_reach = (left > 0.0) & (left < _STEEPEST * (np.log(DEEPEST) - log_m))
     return (at_edge & within_reach).any(axis=1) & (problem.which != LOG_M)
 
 
-def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indices]:
-    """The flows that lie between columns that go over into each other, the columns after which there is a gap that may
-    hide more, and wants a column, and those after which columns do not tell."""
-    left = np.flatnonzero(columns.member[1:] == columns.member[:-1])
+def _links(problem: Problem, trajectories: ScannedFlows) -> tuple[Brackets, Indices, Indices]:
+    """The flows that lie between trajectories that go over into each other, the trajectories after which there is a gap
+    that may hide more, and wants a trajectory, and those after which trajectories do not tell."""
+    left = np.flatnonzero(trajectories.member[1:] == trajectories.member[:-1])
     right = left + 1
-    member = columns.member[left]
-    a, b = columns.flows[left], columns.flows[right]
-    n_a, n_b = columns.count[left], columns.count[right]
-    step = columns.log_t[right] - columns.log_t[left]
+    member = trajectories.member[left]
+    a, b = trajectories.flows[left], trajectories.flows[right]
+    n_a, n_b = trajectories.count[left], trajectories.count[right]
+    step = trajectories.log_t[right] - trajectories.log_t[left]
     apart = _APART + _BY_TEMPERATURE * step
     deepest = problem.deepest[member]
     # From the surface down the flows go over into each other, up to the first that does not.
@@ -231,15 +234,15 @@ def _links(problem: Problem, columns: Columns) -> tuple[Brackets, Indices, Indic
     linked = place < first[:, None]
     crossing = linked & ((off_a > 0.0) != (off_b > 0.0))
     split = _unlinked(a, b, off_a, off_b, n_a, n_b, first, step, deepest)
-    turning = _turning(columns, left, linked, off_a, off_b)
+    turning = _turning(trajectories, left, linked, off_a, off_b)
     split |= turning
     rows, places = np.nonzero(crossing)
     log_m = np.maximum(a[rows, places, LOG_M], b[rows, places, LOG_M])
     found = Brackets(
         member[rows],
         places,
-        columns.log_t[left[rows]],
-        columns.log_t[right[rows]],
+        trajectories.log_t[left[rows]],
+        trajectories.log_t[right[rows]],
         off_a[rows, places],
         off_b[rows, places],
         log_m,
@@ -258,7 +261,7 @@ def _unlinked(
     step: Array,
     deepest: Array,
 ) -> NDArray[np.bool_]:
-    """Where flows of neighbouring columns that do not go over into each other may hide the value asked for."""
+    """Where flows of neighbouring trajectories that do not go over into each other may hide the requested value."""
     apart = _APART + _BY_TEMPERATURE * step
     place = np.arange(_MOST)
     # From below, flows may go over into each other with other places.
@@ -290,13 +293,13 @@ def _unlinked(
 
 
 def _turning(
-    columns: Columns, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
+    trajectories: ScannedFlows, left: Indices, linked: NDArray[np.bool_], off_a: Array, off_b: Array
 ) -> NDArray[np.bool_]:
-    """The gaps, after the columns ``left``, in which the quantity may turn along a family so near to its value that it
-    passes it between columns without a change of sign, or more than once with one."""
-    step = (columns.log_t[left + 1] - columns.log_t[left])[:, None]
+    """The gaps, after the trajectories ``left``, in which the quantity may turn along a branch so near to its value
+    that it passes it between trajectories without a change of sign, or more than once with one."""
+    step = (trajectories.log_t[left + 1] - trajectories.log_t[left])[:, None]
     # Of all gaps in order, those between members missing.
-    slope = np.full((columns.member.size - 1, _MOST), np.nan)
+    slope = np.full((trajectories.member.size - 1, _MOST), np.nan)
     slope[left] = np.where(linked, (off_b - off_a) / step, np.nan)
     change = np.abs(np.diff(slope, axis=0, prepend=np.nan, append=np.nan))
     noise = np.ones((len(slope), 1))
@@ -313,7 +316,7 @@ def _turning(
 def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flows, NDArray[np.bool_]]:
     """The flows in the brackets, and the members on which one could not be found to ``tolerance``."""
     failed = np.zeros(len(problem.batch), dtype=bool)
-    near = Near(problem, brackets)
+    near = FlowsInBrackets(problem, brackets)
     log_t, slope = near.rough()
     pending = np.arange(brackets.member.size)
     flows: list[Flows] = []
@@ -344,7 +347,7 @@ def _found(problem: Problem, brackets: Brackets, tolerance: float) -> tuple[Flow
     return Flows.joined(flows), failed
 
 
-class Near:
+class FlowsInBrackets:
     """Flows near surface temperatures inside their brackets."""
 
     def __init__(self, problem: Problem, brackets: Brackets) -> None:
@@ -357,7 +360,7 @@ class Near:
         self._gradient = np.zeros((3, brackets.member.size))
 
     def gradient(self, which: Indices) -> Array:
-        """d (ln Q, ln h, ln M)/d ln T_surface along the family, (3, m)."""
+        """d (ln Q, ln h, ln M)/d ln T_surface along the branch, (3, m)."""
         return self._gradient[:, which]
 
     def at(self, which: Indices, log_t: Array, accuracy: Accuracy) -> Flows:
@@ -371,17 +374,17 @@ class Near:
         state = np.full((found.state.shape[0], which.size), np.nan)
         state[:, there] = found.state[:, safe[there]]
         with np.errstate(invalid="ignore"):
-            return flows_on(some, temperature, Found(np.arange(which.size), state, found.trouble))
+            return evaluate_flows(some, temperature, EventZeros(np.arange(which.size), state, found.trouble))
 
     def rough(self) -> tuple[Array, Array]:
-        """ln T of the flows by rough columns, and the slope of the quantity's logarithm over it in the bracket."""
+        """ln T of the flows by rough trajectories, and the slope of the quantity's logarithm over it in the bracket."""
         b = self._brackets
 
         def off(which: Indices, log_t: Array) -> Array:
             return self.at(which, log_t, _POLISH).macroscopic[self._problem.which] - self._target[which]
 
         slope = (b.f_high - b.f_low) / (b.high - b.low)
-        return zeros(off, b.low, b.high, b.f_low, b.f_high, _NEAR, _NEAR), slope
+        return find_zeros(off, b.low, b.high, b.f_low, b.f_high, _NEAR, _NEAR), slope
 
     def polished(self, which: Indices, log_t: Array, slope: Array, accuracy: Accuracy) -> tuple[Array, Array, Array]:
         """ln T where the quantity has its value, the slope there, and (ln Q, ln h, ln M, ln T) (4, m): by secants."""
@@ -406,5 +409,5 @@ class Near:
         return log_t, slope, here
 
 
-#: Accuracy of the columns between which a zero is sought.
+#: Accuracy of the trajectories between which a zero is sought.
 _POLISH = Accuracy(1e-7, 2e-3)

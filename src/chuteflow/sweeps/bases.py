@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.sweeps.aligned import Aligned
-from chuteflow.sweeps.batch import GLIDE, LOG_P, MOMENT, ROWS, Along, Batch, Indices
-from chuteflow.sweeps.marching import Accuracy, Ends, Found, march
+from chuteflow.sweeps.aligned import AlignedArrays
+from chuteflow.sweeps.batch import LOG_P, MOMENT, ROWS, SHEAR_FLUX, Batch, Indices, Pointwise
+from chuteflow.sweeps.marching import Accuracy, Ends, EventZeros, march
 
 #: Accuracies, one after the other: a member goes on to the next until its flows are settled.
 LADDER = (Accuracy(3e-8, 4e-3), Accuracy(1e-9, 5e-4), Accuracy(3e-11, 1e-5), Accuracy(1e-12, 1e-8))
@@ -29,7 +29,7 @@ _BELOW = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class Flows(Aligned):
+class Flows(AlignedArrays):
     """Flows of a batch: the ``member`` (k,) of each, its ``temperature`` at the surface and ``state`` (ROWS, k) at the
     base, the logarithms ``macroscopic`` (4, k) of Q, h, M and T_surface, and its relative ``error``."""
 
@@ -50,17 +50,17 @@ class Flows(Aligned):
         return whole.take(order)
 
 
-def meets_base(at: Along, _: Indices) -> Array:
+def meets_base(at: Pointwise, _: Indices) -> Array:
     """Heat flux less that which a base would give: zero at the base of a flow."""
     return at.y - at.base_flux
 
 
-def flows_on(batch: Batch, temperature: Array, found: Found) -> Flows:
-    """The zeros of :func:`meets_base` as flows, without an error as yet."""
+def evaluate_flows(batch: Batch, temperature: Array, found: EventZeros) -> Flows:
+    """The zeros of :func:`meets_base` as flows, without an error yet."""
     member, state = found.member, found.state
-    at = batch.take(member).along(state)
+    at = batch.take(member).at_state(state)
     mass = at.p - batch.surface_stress
-    flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[GLIDE]
+    flux = at.slip * np.sqrt(at.temperature) * mass + at.p**2 * state[SHEAR_FLUX]
     macroscopic = np.empty((4, member.size))
     macroscopic[LOG_Q] = np.log(np.maximum(flux, np.finfo(float).tiny))
     macroscopic[LOG_H] = np.log(at.p * state[MOMENT] / mass)
@@ -69,7 +69,7 @@ def flows_on(batch: Batch, temperature: Array, found: Found) -> Flows:
     return Flows(member, temperature[member], state, macroscopic, np.full(member.size, np.inf))
 
 
-def at_temperature(
+def solve_at_temperature(
     batch: Batch, temperature: Array, largest_holdup: float, tolerance: float
 ) -> tuple[Flows, NDArray[np.bool_]]:
     """Every flow at the surface temperatures (n,) with hold-ups up to ``largest_holdup``, and the members (n,) on
@@ -79,7 +79,7 @@ def at_temperature(
     coarse = march(batch, temperature, ends, LADDER[0], meets_base)
     unsettled = coarse.trouble.copy()
     unsettled[coarse.member] = True
-    previous = flows_on(batch, temperature, coarse)
+    previous = evaluate_flows(batch, temperature, coarse)
     settled: list[Flows] = []
     for finer in LADDER[1:]:
         pending = np.flatnonzero(unsettled)
@@ -91,10 +91,10 @@ def at_temperature(
         last[coarse.trouble] = np.inf
         there = ends.take(pending).above(last[pending])
         found = march(batch.take(pending), temperature[pending], there, finer, meets_base)
-        fine = flows_on(batch, temperature, Found(pending[found.member], found.state, unsettled))
+        fine = evaluate_flows(batch, temperature, EventZeros(pending[found.member], found.state, unsettled))
         trouble = np.zeros(len(batch), dtype=bool)
         trouble[pending] = found.trouble
-        fine, agreed = compared(len(batch), previous, fine, least_error(finer))
+        fine, agreed = estimate_errors(len(batch), previous, fine, least_error(finer))
         worst = np.zeros(len(batch))
         np.maximum.at(worst, fine.member, fine.error)
         done = unsettled & agreed & ~trouble & (worst <= tolerance)
@@ -110,7 +110,7 @@ def least_error(accuracy: Accuracy) -> float:
     return max(_FLOOR, _CHANCE * accuracy.tolerance)
 
 
-def compared(members: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
+def estimate_errors(members: int, coarse: Flows, fine: Flows, least: float) -> tuple[Flows, NDArray[np.bool_]]:
     """The finer flows with the error that their distance from the coarser ones tells, at ``least`` so much, and the
     members on which both are equally many."""
     many = np.bincount(coarse.member, minlength=members)

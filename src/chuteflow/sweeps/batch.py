@@ -15,7 +15,7 @@ one, nothing else would be gained by tables.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -29,7 +29,7 @@ from chuteflow.theory.laws import law
 Indices = NDArray[np.intp]
 
 #: Rows of a state: ln p, ln X, y, the integral of P dz over p, that of P du over p^2, and that of dz.
-LOG_P, LOG_X, FLUX, MOMENT, GLIDE, HEIGHT = range(6)
+LOG_P, LOG_X, FLUX, MOMENT, SHEAR_FLUX, HEIGHT = range(6)
 ROWS = 6
 #: Densities at which the speed of a member's equations is looked up, and others at which the sign of net is.
 _DENSITIES = np.append(0.0, np.logspace(-3.0, 4.0, 15))
@@ -39,14 +39,14 @@ _SIGNS = np.append(0.0, np.logspace(-2.5, 4.0, 60))
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Chutes of one law and one surface, arrays (n,): the slope and restitution, and F1 of (3.16), affine in
-    the closures: ``slip`` + s shear + ``slip_by_grip`` grip; ``base_loss`` is (2.15)."""
+    the closures: ``slip`` + s shear + ``slip_by_wall_shear`` wall_shear; ``base_loss`` is (2.15)."""
 
     law: Law
     surface: str
     slope: Array
     restitution: Array
     slip: Array
-    slip_by_grip: Array
+    slip_by_wall_shear: Array
     base_loss: Array
 
     @classmethod
@@ -74,8 +74,10 @@ class Batch:
 
     def take(self, members: Indices) -> Batch:
         """The batch of the chutes ``members``, which may repeat."""
-        arrays = [getattr(self, field.name)[members] for field in fields(self)[2:]]
-        return Batch(self.law, self.surface, *arrays)
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(
+            self, **{name: values[members] for name, values in arrays.items() if isinstance(values, np.ndarray)}
+        )
 
     @property
     def surface_stress(self) -> float:
@@ -88,16 +90,16 @@ class Batch:
         nothing = np.zeros(len(self))
         return reduce(self.law, nothing, cast(Any, self.restitution), cast(Any, self.slope)).drift == 0.0
 
-    def along(self, state: Array) -> Along:
+    def at_state(self, state: Array) -> Pointwise:
         """Everything pointwise at states (ROWS, n)."""
-        return Along(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])
+        return Pointwise(self, np.exp(state[LOG_P]), state[LOG_X], state[FLUX])
 
     def at_density(self, x: Array) -> tuple[Array, Array, Array, Array]:
         """Conduction, net loss, base flux and volume fraction at X, of the shape (..., n)."""
-        here = Along(self, np.ones_like(x), np.log(np.maximum(x, 1e-300)), np.zeros_like(x))
+        here = Pointwise(self, np.ones_like(x), np.log(np.maximum(x, 1e-300)), np.zeros_like(x))
         return here.conduction, here.net, here.base_flux, here.nu
 
-    def pace(self) -> tuple[Array, Array]:
+    def fastest_rates(self) -> tuple[Array, Array]:
         """Fastest rate of y in p, and the largest y at which loss and conduction balance, (n,)."""
         x = np.broadcast_to(_DENSITIES[:, None], (len(_DENSITIES), len(self)))
         conduction, net, _, _ = self.at_density(x)
@@ -120,10 +122,23 @@ class Batch:
 _ZERO, _ONE = np.zeros(()), np.ones(())
 
 
-class Along:
+class Pointwise:
     """The closures and the balance at one point of every member, arrays of the shape of ``p``."""
 
-    __slots__ = ("_base", "_batch", "_reduced", "conduction", "coupling", "ease", "log_x", "net", "nu", "p", "v", "y")
+    __slots__ = (
+        "_base",
+        "_batch",
+        "_reduced",
+        "conduction",
+        "coupling",
+        "log_x",
+        "log_x_rate",
+        "net",
+        "nu",
+        "p",
+        "v",
+        "y",
+    )
 
     def __init__(self, batch: Batch, p: Array, log_x: Array, y: Array) -> None:
         x = np.exp(log_x)
@@ -136,7 +151,7 @@ class Along:
         coupled = r.drift
         stiff = r.stiffness + coupled
         self.coupling = coupled / stiff
-        self.ease = 1.0 / (stiff * room)  # dL/dln x
+        self.log_x_rate = 1.0 / (stiff * room)  # dL/dln x
         self.conduction = r.conduction
         self.net = r.loss - batch.slope**2 * r.work
         self.v = p * y / r.conduction
@@ -165,7 +180,7 @@ class Along:
     def slip(self) -> Array:
         """F1 of (3.16)."""
         r, b = self._reduced, self._batch
-        return b.slip + b.slope * r.shear + b.slip_by_grip * r.grip
+        return b.slip + b.slope * r.shear + b.slip_by_wall_shear * r.wall_shear
 
     @property
     def base_flux(self) -> Array:
@@ -177,10 +192,10 @@ class Along:
         p, y, batch = self.p, self.y, self._batch
         still = 1.0 - self.v
         out[LOG_P] = 1.0
-        out[LOG_X] = still * self.ease
+        out[LOG_X] = still * self.log_x_rate
         out[FLUX] = p * self.net - y * (1.0 + 0.5 * (self.v + self.coupling * still))
         fraction = 1.0 - batch.surface_stress / p if batch.surface_stress else 1.0
         thickness = p / self.nu
         out[MOMENT] = fraction * thickness - state[MOMENT]
-        out[GLIDE] = fraction * (batch.slope * self.work) * np.sqrt(self.temperature) - 2.0 * state[GLIDE]
+        out[SHEAR_FLUX] = fraction * (batch.slope * self.work) * np.sqrt(self.temperature) - 2.0 * state[SHEAR_FLUX]
         out[HEIGHT] = thickness

@@ -38,7 +38,7 @@ def shown_path(path: str | os.PathLike[str]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class DesignAxis:
     """One parameter: ``values`` (k,) as numbers, or where it is ``words`` their places among these; or a range from
     ``low`` to ``high``, even in the parameter or, where it is ``log``, in its logarithm, of ``steps`` values where it
     is divided."""
@@ -80,15 +80,15 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class StudyDesign:
     """The points of a study: ``rows(first, last)`` gives their parameters as columns by name."""
 
     points: int
-    axes: Mapping[str, Axis]
+    axes: Mapping[str, DesignAxis]
     rows: Callable[[int, int], dict[str, Array]]
 
     @classmethod
-    def listed(cls, axes: Mapping[str, Axis]) -> Design:
+    def listed(cls, axes: Mapping[str, DesignAxis]) -> StudyDesign:
         """The points as they are in columns of equal length."""
         points = max(len(axis.values) for axis in axes.values())
 
@@ -107,7 +107,7 @@ class Design:
 OPEN = ("closure", "base")
 
 
-def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], str]]) -> Axis:
+def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], str]]) -> DesignAxis:
     """The axis that a value of the study's table describes: one value, a list of them, or a range.
 
     Raises:
@@ -125,15 +125,15 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
             known = (*known, one)
         if not names:
             raise InputError(f"{key} = []: give at least one value")
-        return Axis(name, np.array([known.index(one) for one in names], dtype=float), known)
+        return DesignAxis(name, np.array([known.index(one) for one in names], dtype=float), known)
     if isinstance(value, Mapping):
         return _range(name, key, value)
     if isinstance(value, np.ndarray) and value.dtype == float and np.isfinite(value).all():
-        return Axis(name, value)
+        return DesignAxis(name, value)
     values = _listed(value)
     if not values:
         raise InputError(f"{key} = []: give at least one value")
-    return Axis(name, np.array([number(key, one) for one in values]))
+    return DesignAxis(name, np.array([number(key, one) for one in values]))
 
 
 def _listed(value: Any) -> list[Any]:
@@ -142,7 +142,7 @@ def _listed(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _range(name: str, key: str, value: Mapping[str, Any]) -> Axis:
+def _range(name: str, key: str, value: Mapping[str, Any]) -> DesignAxis:
     for one in value:
         if one not in ("from", "to", "points", "scale"):
             raise InputError(f"unknown key {key}.{shown_key(one)}: a range has from, to, points and scale")
@@ -160,7 +160,7 @@ def _range(name: str, key: str, value: Mapping[str, Any]) -> Axis:
     count = value.get("points", 0)
     if isinstance(count, bool) or not isinstance(count, int) or (count != 0 and not 2 <= count <= MOST_POINTS):
         raise InputError(f"{key}.points = {shown(count)}: must be a whole number from 2 to {MOST_POINTS}")
-    return Axis(name, np.empty(0), (), low, high, scale == "log", True, count)
+    return DesignAxis(name, np.empty(0), (), low, high, scale == "log", True, count)
 
 
 def _between(low: float, high: float, fraction: Array, log: bool) -> Array:
@@ -172,14 +172,14 @@ def _between(low: float, high: float, fraction: Array, log: bool) -> Array:
 
 
 @dataclass(frozen=True)
-class Kind:
+class DesignKind:
     """A kind of design: what its table may hold, and how it is made."""
 
     settings: tuple[str, ...]
-    make: Callable[[Mapping[str, Any], Mapping[str, Axis]], Design]
+    make: Callable[[Mapping[str, Any], Mapping[str, DesignAxis]], StudyDesign]
 
 
-def _product(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
+def _product(head: Mapping[str, Any], axes: Mapping[str, DesignAxis]) -> StudyDesign:
     """Every combination of the values; the last parameter of the table runs fastest."""
     del head
     for axis in axes.values():
@@ -191,10 +191,10 @@ def _product(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
         places = np.unravel_index(np.arange(first, last), shape)
         return {name: axis.nth(place) for (name, axis), place in zip(axes.items(), places, strict=True)}
 
-    return Design(math.prod(shape), axes, rows)
+    return StudyDesign(math.prod(shape), axes, rows)
 
 
-def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
+def _random(head: Mapping[str, Any], axes: Mapping[str, DesignAxis]) -> StudyDesign:
     """Independent points, the same whatever the size of the pieces."""
     points, seed = _points(head), _seed(head)
 
@@ -207,10 +207,10 @@ def _random(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
         fractions = fractions[first - begin * _BLOCK : last - begin * _BLOCK]
         return _at(axes, fractions)
 
-    return Design(points, axes, rows)
+    return StudyDesign(points, axes, rows)
 
 
-def _sobol(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
+def _sobol(head: Mapping[str, Any], axes: Mapping[str, DesignAxis]) -> StudyDesign:
     """Sobol' points, scrambled: evenly spread, in pieces and as a whole."""
     points, seed = _points(head), _seed(head)
     source = Sobol(len(axes), seed)
@@ -218,10 +218,10 @@ def _sobol(head: Mapping[str, Any], axes: Mapping[str, Axis]) -> Design:
     def rows(first: int, last: int) -> dict[str, Array]:
         return _at(axes, source.points(first, last))
 
-    return Design(points, axes, rows)
+    return StudyDesign(points, axes, rows)
 
 
-def _at(axes: Mapping[str, Axis], fractions: Array) -> dict[str, Array]:
+def _at(axes: Mapping[str, DesignAxis], fractions: Array) -> dict[str, Array]:
     return {
         name: axis.at(np.ascontiguousarray(column))
         for (name, axis), column in zip(axes.items(), fractions.T, strict=True)
@@ -229,18 +229,18 @@ def _at(axes: Mapping[str, Axis], fractions: Array) -> dict[str, Array]:
 
 
 #: Kinds of designs by name; a list is made from columns instead.
-DESIGNS: dict[str, Kind] = {
-    "product": Kind((), _product),
-    "random": Kind(("points", "seed"), _random),
-    "sobol": Kind(("points", "seed"), _sobol),
+DESIGNS: dict[str, DesignKind] = {
+    "product": DesignKind((), _product),
+    "random": DesignKind(("points", "seed"), _random),
+    "sobol": DesignKind(("points", "seed"), _sobol),
 }
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class PointList:
     """The columns of a list: as axes, and as the table that they were given by."""
 
-    axes: dict[str, Axis]
+    axes: dict[str, DesignAxis]
     table: dict[str, Any]
 
 
@@ -249,7 +249,7 @@ def list_design(
     parameters: Mapping[str, Any],
     folder: Path,
     words: Mapping[str, tuple[tuple[str, ...], str]],
-) -> Columns:
+) -> PointList:
     """The columns of a list, in the study or in a CSV file beside it, whose first line names the parameters.
 
     Raises:
@@ -271,7 +271,7 @@ def list_design(
     if len(lengths) > 1:
         what = ", ".join(f"{name} {len(axis.values)}" for name, axis in axes.items())
         raise InputError(f"the columns of a list must be equally long, or one value: got {what}")
-    return Columns(axes, table)
+    return PointList(axes, table)
 
 
 def _csv(path: Path, words: Mapping[str, Any]) -> dict[str, Any]:

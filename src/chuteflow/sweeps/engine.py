@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.enumeration import flows_within
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.sweeps.at_quantity import at_quantity
-from chuteflow.sweeps.bases import Flows, at_temperature
+from chuteflow.sweeps.at_quantity import solve_at_quantity
+from chuteflow.sweeps.bases import Flows, solve_at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
-from chuteflow.sweeps.judged import JUDGED_KINDS, JUDGED_NUMBERS, judged, wanted
-from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, numbers
-from chuteflow.sweeps.outcome import Flags, Reason, Status, reasons
+from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, evaluate_quantities
+from chuteflow.sweeps.outcome import Flags, PointStatus, Reason, reasons
+from chuteflow.sweeps.stability import STABILITY_KINDS, STABILITY_NUMBERS, needs_stability, stability_quantities
 from chuteflow.sweeps.study import RANGES, Study
 from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
@@ -70,14 +70,16 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     out = _empty(study, study.design.rows(first, last), last - first)
     failures: dict[int, str] = {}
     valid = _valid(study, out.parameters, failures)
-    out.status[~valid] = Status.INVALID
+    out.status[~valid] = PointStatus.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
     # Members of a batch have the base of the paper.
     other = _on_other_bases(study, out.parameters) & valid
     singly, winding = int(other.sum()), 0
     for point in np.flatnonzero(other).tolist():
         _fill_singly(study, out, point, failures)
-    out.reason[other & (out.n_flows == 0) & (out.status == Status.COMPLETE)] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+    out.reason[other & (out.n_flows == 0) & (out.status == PointStatus.COMPLETE)] = (
+        Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+    )
     valid &= ~other
     for closure, surface, points in _groups(study, out.parameters, valid):
         batch = _batch(closure, surface, out.parameters, points)
@@ -91,14 +93,14 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
         winding += int(winds.sum())
         singly += int(solved.unsettled.sum())
         _fill_reasons(out, batch, points)
-    told = {first + i: why for i, why in sorted(failures.items())}
-    return replace(out, failures=told, singly=singly, winding=winding)
+    found_failures = {first + i: why for i, why in sorted(failures.items())}
+    return replace(out, failures=found_failures, singly=singly, winding=winding)
 
 
 def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
     """The members on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
 
-    Given surface temperatures are followed down one by one, so that no family of flows has to be found; a given hold-up
+    Given surface temperatures are followed down one by one, so that no branch of flows has to be found; a given hold-up
     need not be followed further.
     """
     if study.condition == "T_surface":
@@ -110,7 +112,7 @@ def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
     grid = (n, study.flows)
     return Chunk(
         parameters=parameters,
-        status=np.full(n, Status.COMPLETE, dtype=np.int8),
+        status=np.full(n, PointStatus.COMPLETE, dtype=np.int8),
         reason=np.zeros(n, dtype=np.int8),
         n_flows=np.zeros(n, dtype=np.int32),
         error=np.full(grid, np.nan),
@@ -196,17 +198,17 @@ class _Solved:
 
 def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    are judged or asked for what is not carried along, or the law has breaks, at which integration in a batch would
-    lose its order."""
-    singly = wanted(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
+    need their stability or quantities that batches do not compute, or the law has breaks, at which
+    integration in a batch would lose its order."""
+    singly = needs_stability(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
     if not len(batch) or singly or not batch.law.smooth:
         none = dict.fromkeys(study.quantities, np.empty(0))
         return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
     try:
         if study.condition == "T_surface":
-            flows, unsettled = at_temperature(batch, value, study.largest_holdup, study.tolerance)
+            flows, unsettled = solve_at_temperature(batch, value, study.largest_holdup, study.tolerance)
         else:
-            flows, unsettled = at_quantity(
+            flows, unsettled = solve_at_quantity(
                 batch,
                 _WHICH[study.condition],
                 value,
@@ -214,7 +216,7 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
                 study.largest_holdup,
                 study.tolerance,
             )
-        return _sound(_Solved(flows, numbers(study.quantities, batch, flows), unsettled))
+        return _sound(_Solved(flows, evaluate_quantities(study.quantities, batch, flows), unsettled))
     except _FAILURES:
         if len(batch) == 1:
             return _Solved(Flows.joined([]), dict.fromkeys(study.quantities, np.empty(0)), np.ones(1, dtype=bool))
@@ -248,7 +250,7 @@ def _fill(study: Study, out: Chunk, points: Indices, solved: _Solved) -> None:
     flows = solved.flows
     counts = np.bincount(flows.member, minlength=len(points))
     out.n_flows[points] = counts
-    out.status[points[counts > study.flows]] = Status.MORE_FLOWS_THAN_KEPT
+    out.status[points[counts > study.flows]] = PointStatus.MORE_FLOWS_THAN_KEPT
     place = np.arange(flows.member.size) - (np.cumsum(counts) - counts)[flows.member]
     kept = place < study.flows
     where = points[flows.member[kept]], place[kept]
@@ -271,7 +273,7 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     base = study.bases[int(p["base"][point]) if "base" in p else 0]
     which, value = _WHICH[study.condition], float(p[study.condition][point])
     # Of this chute nothing else is asked.
-    within = Range.checked(study.surface_temperature, study.largest_holdup, surface).restricted(which, value)
+    within = SearchRange.checked(study.surface_temperature, study.largest_holdup, surface).restricted(which, value)
     try:
         found = flows_within(
             Chute(slope, e, ew, roughness, surface, closure, base),
@@ -281,19 +283,19 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
             within,
         )
     except _FAILURES as error:
-        out.status[point], out.reason[point] = Status.FAILED, Reason.NO_ANSWER
+        out.status[point], out.reason[point] = PointStatus.FAILED, Reason.NO_ANSWER
         failures[point] = str(error) or type(error).__name__
         return
     out.n_flows[point] = len(found)
     if len(found) > study.flows:
-        out.status[point] = Status.MORE_FLOWS_THAN_KEPT
+        out.status[point] = PointStatus.MORE_FLOWS_THAN_KEPT
     for k, flow in enumerate(found[: study.flows]):
         out.error[point, k] = flow.error
-        known, why = judged(flow) if wanted(study.quantities) else ({}, None)
+        known, why = stability_quantities(flow) if needs_stability(study.quantities) else ({}, None)
         if why is not None:
             failures[point] = why
         for name, values in out.quantities.items():
-            if name in JUDGED_KINDS or name in JUDGED_NUMBERS:
+            if name in STABILITY_KINDS or name in STABILITY_NUMBERS:
                 values[point, k] = known.get(name, values[point, k])
                 continue
             value = getattr(flow, name)
@@ -301,6 +303,6 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
 
 
 def _fill_reasons(out: Chunk, batch: Batch, points: Indices) -> None:
-    none = np.flatnonzero((out.n_flows[points] == 0) & (out.status[points] == Status.COMPLETE))
+    none = np.flatnonzero((out.n_flows[points] == 0) & (out.status[points] == PointStatus.COMPLETE))
     if none.size:
         out.reason[points[none]] = reasons(batch.take(none))

@@ -19,26 +19,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.roots import zeros
-from chuteflow.sweeps.aligned import Aligned
-from chuteflow.sweeps.batch import FLUX, GLIDE, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, Along, Batch, Indices
+from chuteflow.numerics.roots import find_zeros
+from chuteflow.sweeps.aligned import AlignedArrays
+from chuteflow.sweeps.batch import FLUX, HEIGHT, LOG_P, LOG_X, MOMENT, ROWS, SHEAR_FLUX, Batch, Indices, Pointwise
 
-Event = Callable[[Along, Indices], Array]
+Event = Callable[[Pointwise, Indices], Array]
 
 #: Members treated at once: so many that the interpreter does not count, so few that they fit the cache.
 MEMBERS = 16384
 _DENSE = 60.0
-#: Densities X below which a member may end as an empty one: the first of them at which that can be told.
+#: Densities X below which a member may end as an empty one: the first of them at which that can be decided.
 _THIN = (1e-2, 1e-3, 1e-6)
 #: By how much p is beyond what the empty state asks for, so that X and the coupling of the heat flux do not matter.
 _FIRMLY = 1.2
 _COLD = 4.0
 _MOST_STEPS = 4000
-#: Parts of a step that is looked at more closely.
+#: Parts of a step that is examined more closely.
 _PARTS = 8
 #: A zero is known to this fraction of its step, or where its event is this small.
 _RESOLUTION, _SMALL = 4e-15, 1e-16
-#: A turn of an event this near to zero, in the spread of its values in the step, is looked at more closely.
+#: A turn of an event this near to zero, in the spread of its values in the step, is examined more closely.
 _NEAR = 0.3
 #: Nodes of Gauss's rule with three points on [0, 1], and its weights.
 _GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
@@ -54,7 +54,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True, eq=False)
-class Ends(Aligned):
+class Ends(AlignedArrays):
     """Where members end (n,): at the normal stress ``deepest``; cold, with a heat flux below ``floor``; and hot, ever
     emptier, with ln X below ``thin``, p above ``settled`` and the heat flux between ``low`` and ``high``, beyond
     which no base is met. ``turn`` is p_1, and ``rate`` the fastest of y in p."""
@@ -71,15 +71,15 @@ class Ends(Aligned):
     @classmethod
     def of(cls, batch: Batch, deepest: Array) -> Ends:
         """The ends of the members of ``batch`` at normal stresses ``deepest`` (n,)."""
-        rate, balance = batch.pace()
+        rate, balance = batch.fastest_rates()
         floor = -_COLD * (balance + rate + 2.0 + batch.slope**2)
         thin = np.full(len(batch), -np.inf)
         settled, low, high = np.full((3, len(batch)), np.inf)
         for x in _THIN:
-            told = _hot_end(batch, x)
-            new = np.isneginf(thin) & np.isfinite(told[0])
+            ends = _hot_end(batch, x)
+            new = np.isneginf(thin) & np.isfinite(ends[0])
             thin[new] = np.log(x)
-            settled[new], low[new], high[new] = told[:, new]
+            settled[new], low[new], high[new] = ends[:, new]
         return cls(deepest, floor, thin, settled, low, high, 1.0 / np.maximum(rate, 1e-3), rate)
 
     def above(self, deepest: Array) -> Ends:
@@ -94,14 +94,14 @@ class Ends(Aligned):
 
 def _hot_end(batch: Batch, x: float) -> Array:
     """p, and the least and largest heat flux (3, n), beyond which a member emptier than X meets no base any more;
-    infinite where that cannot be told.
+    infinite where that cannot be decided.
 
     In the empty state dv/dln p = p^2 net/a - v^2/2, so that v > 1, with which the density falls, lasts where
     p^2 > a/(2 net); and dy/dp = net - y/p - y^2/(2 a), which keeps y above or below the flux of the base for good
     where it points away from it.
     """
     empty, thin = (batch.at_density(np.full(len(batch), one)) for one in (1e-12, x))
-    # All are nearly straight in X so close to the empty state, and lie between the ends, give or take as much again.
+    # All are nearly straight in X so close to the empty state, and lie between the ends, within as much again.
     (a_low, a_high), (net_low, net_high), (base_low, base_high) = (_span(empty[i], thin[i]) for i in range(3))
     loses = (net_low > 0.0) & (a_low > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -123,7 +123,7 @@ def _span(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class EventZeros:
     """Zeros of an event in order of members, along each from the surface down: ``member`` (k,) and ``state`` (ROWS, k).
 
     ``trouble`` (n,) marks the members on which zeros may be missing: where the integration gave up, or a zero lies
@@ -153,7 +153,7 @@ def march(
     ends: Ends,
     accuracy: Accuracy,
     event: Event,
-) -> Found:
+) -> EventZeros:
     """All zeros of ``event`` on the trajectories from the surface temperatures ``temperature`` (n,).
 
     ``event`` takes the fields at one point of some members and the numbers of the members.
@@ -175,7 +175,7 @@ def march(
     member = np.concatenate([z[0] for z in zeros]) if zeros else np.empty(0, dtype=np.intp)
     state = np.concatenate([z[1] for z in zeros], axis=1) if zeros else np.empty((ROWS, 0))
     order = np.lexsort((state[LOG_P], member))
-    return Found(member[order], state[:, order], trouble)
+    return EventZeros(member[order], state[:, order], trouble)
 
 
 def _march(
@@ -186,7 +186,7 @@ def _march(
     with np.errstate(all="ignore"):
         state, above = start(batch, temperature, ends.rate, accuracy.start)
         member = np.arange(len(batch))
-        here = batch.along(state)
+        here = batch.at_state(state)
         slope = np.empty_like(state)
         _in_tau(here, state, ends.turn, slope)
         seen = event(here, member)
@@ -226,13 +226,13 @@ def _march(
         return _located(batch, ends, steps, event)
 
 
-def _in_tau(at: Along, state: Array, turn: Array, out: Array) -> None:
+def _in_tau(at: Pointwise, state: Array, turn: Array, out: Array) -> None:
     at.derivative(state, out)
     out /= 1.0 + at.p / turn
 
 
 def _step(
-    batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Along], Array]
+    batch: Batch, ends: Ends, state: Array, h: Array, stages: Array, values: Array, event: Callable[[Pointwise], Array]
 ) -> Array:
     """One step of each member: fills the derivatives (13, ROWS, n) and events (13, n) at the stages after the first,
     and returns the states at the end."""
@@ -240,12 +240,12 @@ def _step(
     for i in range(1, 12):
         moved = state.copy()
         moved[:HEIGHT] += h * _combined(a[i, :i], stages[:i, :HEIGHT])  # nothing depends on the height
-        at = batch.along(moved)
+        at = batch.at_state(moved)
         _in_tau(at, moved, ends.turn, stages[i])
         if i in _SEEN:
             values[i] = event(at)
     end = state + h * _combined(b, stages[:12])
-    at = batch.along(end)
+    at = batch.at_state(end)
     _in_tau(at, end, ends.turn, stages[12])
     values[12] = event(at)
     return end
@@ -314,7 +314,7 @@ def _located(
     brackets += list(_closer(partial, other, seen[0, other], seen[-1, other]))
     which, low, high, f_low, f_high = (np.concatenate(part) for part in zip(*brackets, strict=True))
     which = which.astype(np.intp)
-    fraction = zeros(lambda some, x: partial.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
+    fraction = find_zeros(lambda some, x: partial.to(which[some], x)[1], low, high, f_low, f_high, _RESOLUTION, _SMALL)
     end, _ = partial.to(which, fraction)
     return member[which], end
 
@@ -339,7 +339,7 @@ class PartialSteps:
             local, edges, member = self.batch.take(some), self.ends.take(some), self.member[some]
             state = self.state[:, some]
             stages, seen = np.empty((13, ROWS, some.size)), np.empty((13, some.size))
-            _in_tau(local.along(state), state, edges.turn, stages[0])
+            _in_tau(local.at_state(state), state, edges.turn, stages[0])
             out[:, part] = _step(
                 local,
                 edges,
@@ -389,17 +389,17 @@ def _closer(
     yield which[columns], at[rows, columns], at[rows + 1, columns], values[rows, columns], values[rows + 1, columns]
 
 
-def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tuple[Array, Along]:
+def start(batch: Batch, temperature: Array, rate: Array, fraction: float) -> tuple[Array, Pointwise]:
     """States (ROWS, n) a little below the free surface, or at the interface, and the fields at the very surface."""
     if batch.surface_stress:
         state = _at_interface(batch, temperature)
-        return state, batch.along(state)
+        return state, batch.at_state(state)
     p = fraction * np.minimum(temperature, 1.0 / np.maximum(rate, 1.0))
-    empty = Along(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
+    empty = Pointwise(batch, np.zeros_like(p), np.full_like(p, -690.0), np.zeros_like(p))
     return _series(batch, temperature, p, empty), empty
 
 
-def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
+def _series(batch: Batch, temperature: Array, p: Array, empty: Pointwise) -> Array:
     """The state at p by the series at the surface of the half-line, (3.23)-(3.25): y and theta to a relative p^2."""
     half = 0.5 * empty.net
     lean = half / empty.conduction
@@ -413,12 +413,12 @@ def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
         for node, weight in _GAUSS:
             inner = node * nu
             gamma += weight * nu * _coupling(batch, inner / (1.0 - inner / densest))
-        at = Along(batch, p, np.log(x), y)
+        at = Pointwise(batch, p, np.log(x), y)
         y = p * (half + (at.net - empty.net) / 3.0 - half * (at.v + at.coupling * (1.0 - at.v)) / 6.0)
         theta = np.log(temperature) + 0.5 * p**2 * lean + p * (y / at.conduction - p * lean) / 3.0
         nu = p * np.exp(-theta - gamma) / (p / (at.nu * at.temperature))
         x = nu / (1.0 - nu / densest)
-    at = Along(batch, p, np.log(x), y)
+    at = Pointwise(batch, p, np.log(x), y)
     state, derivative = np.zeros((ROWS, p.size)), np.empty((ROWS, p.size))
     state[LOG_P], state[LOG_X], state[FLUX] = np.log(p), np.log(x), y
     at.derivative(state, derivative)
@@ -426,13 +426,13 @@ def _series(batch: Batch, temperature: Array, p: Array, empty: Along) -> Array:
     thickness = derivative[HEIGHT]
     thinning = thickness * (1.0 - derivative[LOG_X] / (1.0 + x / densest))
     state[MOMENT] = (temperature + 2.0 * thickness) / 3.0 - thinning / 6.0
-    state[GLIDE] = batch.slope * empty.work * np.sqrt(temperature) / 6.0 + derivative[GLIDE] / 3.0
+    state[SHEAR_FLUX] = batch.slope * empty.work * np.sqrt(temperature) / 6.0 + derivative[SHEAR_FLUX] / 3.0
     return state
 
 
 def _coupling(batch: Batch, x: Array) -> Array:
     """g4/g3 at X."""
-    at = Along(batch, np.ones_like(x), np.log(x), np.zeros_like(x))
+    at = Pointwise(batch, np.ones_like(x), np.log(x), np.zeros_like(x))
     return at.raw_coupling
 
 
@@ -441,7 +441,7 @@ def _at_interface(batch: Batch, temperature: Array) -> Array:
     p = np.full(len(batch), batch.surface_stress)
     log_x = np.log(p / temperature)
     for _ in range(100):
-        at = Along(batch, p, log_x, np.zeros_like(p))
+        at = Pointwise(batch, p, log_x, np.zeros_like(p))
         # d ln g1/d ln X = stiffness dln nu/dln X
         move = np.clip(np.log(at.temperature / temperature) / at.stiff_x, -2.0, 2.0)
         log_x = log_x + move

@@ -11,21 +11,21 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q
 from chuteflow.steady.flow import CUTOFF
 from chuteflow.steady.kinds import DENSITIES, INTERIORS
 from chuteflow.sweeps.bases import Flows
-from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Along, Batch, Indices
-from chuteflow.sweeps.judged import JUDGED_KINDS
+from chuteflow.sweeps.batch import HEIGHT, LOG_P, LOG_X, Batch, Indices, Pointwise
 from chuteflow.sweeps.marching import Accuracy, Ends, march, start
+from chuteflow.sweeps.stability import STABILITY_KINDS
 
 #: Names of kinds in the order of their flags.
-KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **JUDGED_KINDS}
-#: With which flows are looked at once more for what happens on the way to the base.
+KINDS: dict[str, tuple[str, ...]] = {"interior": INTERIORS, "density": DENSITIES, **STABILITY_KINDS}
+#: With which flows are examined again for what happens on the way to the base.
 _ACCURACY = Accuracy(1e-10, 1e-7)
 #: Net loss within this of zero, in its largest value on the way, decides nothing.
 _DECIDES = 1e-9
-#: Quantities that are not carried along side by side: studies that ask for them are solved one by one.
+#: Quantities that are not computed in batches: studies that ask for them are solved one by one.
 ONE_BY_ONE = ("surface_velocity", "mean_volume_fraction")
 
 
-def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
+def evaluate_quantities(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array]:
     """The quantities ``names`` of the flows, (k,) each; kinds as their places among KINDS."""
     of = batch.take(flows.member)
     plain = {
@@ -33,16 +33,16 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
         "centre_of_mass": lambda: np.exp(flows.macroscopic[LOG_H]),
         "mass_holdup": lambda: np.exp(flows.macroscopic[LOG_M]),
         "surface_temperature": lambda: flows.temperature,
-        "base_temperature": lambda: of.along(flows.state).temperature,
-        "base_volume_fraction": lambda: of.along(flows.state).nu,
-        "slip_velocity": lambda: _slip(of.along(flows.state)),
+        "base_temperature": lambda: of.at_state(flows.state).temperature,
+        "base_volume_fraction": lambda: of.at_state(flows.state).nu,
+        "slip_velocity": lambda: _slip(of.at_state(flows.state)),
         "mean_velocity": lambda: _mean_velocity(flows),
         "angle": lambda: np.degrees(np.arctan(of.slope)),
     }
     out: dict[str, Array] = {name: value() for name, value in plain.items() if name in names}
     rest = set(names) - set(plain)
     if rest and flows.member.size:
-        inside = Inside(of, flows)
+        inside = InteriorQuantities(of, flows)
         further: dict[str, Callable[[], Array]] = {
             "largest_volume_fraction": lambda: inside.largest,
             "depth": lambda: inside.depth,
@@ -57,7 +57,7 @@ def numbers(names: Sequence[str], batch: Batch, flows: Flows) -> dict[str, Array
     return out
 
 
-def _slip(at: Along) -> Array:
+def _slip(at: Pointwise) -> Array:
     return at.slip * np.sqrt(at.temperature)
 
 
@@ -65,7 +65,7 @@ def _mean_velocity(flows: Flows) -> Array:
     return np.exp(flows.macroscopic[LOG_Q] - flows.macroscopic[LOG_M])
 
 
-class Inside:
+class InteriorQuantities:
     """What happens between the surface and the base of flows, each on a member of its own."""
 
     def __init__(self, of: Batch, flows: Flows) -> None:
@@ -74,14 +74,14 @@ class Inside:
         self._first, _ = start(of, flows.temperature, self._ends.rate, _ACCURACY.start)
         # Where the density turns: v = 1.
         self._turns = self._march(lambda at, _: at.v - 1.0)
-        first, base = np.exp(self._first[LOG_X]), of.along(flows.state).nu
+        first, base = np.exp(self._first[LOG_X]), of.at_state(flows.state).nu
         largest = np.maximum(first / (1.0 + first / of.law.densest), base)
         member, state = self._turns
         if member.size:
-            np.maximum.at(largest, member, of.take(member).along(state).nu)
+            np.maximum.at(largest, member, of.take(member).at_state(state).nu)
         self.largest: Array = largest
 
-    def _march(self, event: Callable[[Along, Indices], Array]) -> tuple[Indices, Array]:
+    def _march(self, event: Callable[[Pointwise, Indices], Array]) -> tuple[Indices, Array]:
         found = march(self._of, self._flows.temperature, self._ends, _ACCURACY, event)
         above = found.state[LOG_P] < self._flows.state[LOG_P, found.member]
         return found.member[above], found.state[:, above]
@@ -89,15 +89,15 @@ class Inside:
     @property
     def inverted(self) -> Array:
         """1 where the volume fraction rises with height anywhere: where it falls downwards at a turn or the base."""
-        out = self._of.along(self._flows.state).v > 1.0
-        out |= self._of.along(self._first).v > 1.0
+        out = self._of.at_state(self._flows.state).v > 1.0
+        out |= self._of.at_state(self._first).v > 1.0
         out[self._turns[0]] = True
         return out.astype(float)
 
     @property
     def interior(self) -> Array:
         """Places among INTERIORS."""
-        nets = [self._of.along(self._first).net, self._of.along(self._flows.state).net]
+        nets = [self._of.at_state(self._first).net, self._of.at_state(self._flows.state).net]
         size = np.maximum(np.abs(nets[0]), np.abs(nets[1]))
         member, _ = self._march(lambda at, _: at.net)
         gains = (nets[0] < -_DECIDES * size) | (nets[1] < -_DECIDES * size)

@@ -12,7 +12,7 @@ from chuteflow.sweeps.batch import Batch
 Flags = NDArray[np.int8]
 
 
-class Status(IntEnum):
+class PointStatus(IntEnum):
     """How a point ended."""
 
     NOT_COMPUTED = -1
@@ -36,7 +36,8 @@ class Reason(IntEnum):
 
 
 def reasons(batch: Batch) -> Flags:
-    """Why the chutes of ``batch`` (n,) have no flow, as :func:`chuteflow.branches.existence.imbalance` has it."""
+    """Why the chutes of ``batch`` (n,) have no flow, as :func:`chuteflow.branches.existence.explain_imbalance` has
+    it."""
     x = np.append(0.0, np.logspace(-6.0, 9.0, 61))
     lowest, highest = np.full(len(batch), np.inf), np.full(len(batch), -np.inf)
     least, most = lowest.copy(), highest.copy()

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chuteflow.errors import InputError
+from chuteflow.extras import require
 from chuteflow.processes import WorkerPool, death, worker_pool
 from chuteflow.sweeps.store import Marker, Store, StoreError
 from chuteflow.sweeps.work import work
@@ -67,13 +68,9 @@ def cluster_workers(address: str) -> Workers:
     import logging
     from concurrent.futures import CancelledError
 
-    try:
-        from distributed import Client, KilledWorker
-        from distributed.client import FutureCancelledError
-    except ImportError:
-        raise InputError(
-            "--cluster needs dask.distributed: install it with the extra 'cluster', chuteflow[cluster]"
-        ) from None
+    require("distributed", "cluster", "--cluster")
+    from distributed import Client, KilledWorker
+    from distributed.client import FutureCancelledError
 
     # What is lost on the way is told here, in a line.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -115,7 +112,7 @@ def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marke
         WorkerError: where workers cannot start.
     """
     deaths: Counter[int] = Counter()
-    left = _Left(iter(chunks), store)
+    left = _RemainingChunks(iter(chunks), store)
     while True:
         with workers.start() as executor:
             broken = yield from _until_broken(store, left, executor, workers, deaths)
@@ -123,7 +120,7 @@ def run(store: Store, chunks: Iterable[int], workers: Workers) -> Iterator[Marke
             return
 
 
-class _Left:
+class _RemainingChunks:
     """The chunks that are still to be handed out, those that came back first."""
 
     def __init__(self, chunks: Iterator[int], store: Store) -> None:
@@ -143,7 +140,7 @@ class _Left:
 
 
 def _until_broken(
-    store: Store, left: _Left, executor: Executor, workers: Workers, deaths: Counter[int]
+    store: Store, left: _RemainingChunks, executor: Executor, workers: Workers, deaths: Counter[int]
 ) -> Iterator[Marker]:
     """Hand out chunks until none is left, which returns False, or the workers have died, which returns True."""
     out: dict[Future[Marker], int] = {}

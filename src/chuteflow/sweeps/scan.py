@@ -20,7 +20,7 @@ from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.sweeps.engine import Chunk, solve_chunk
 from chuteflow.sweeps.numbers import KINDS
-from chuteflow.sweeps.outcome import Status, meanings
+from chuteflow.sweeps.outcome import PointStatus, meanings
 from chuteflow.sweeps.study import DEFAULT_QUANTITIES, TOLERANCE, from_dict
 from chuteflow.threads import on_one_thread
 
@@ -35,8 +35,9 @@ class Scan(Result):
     """The flows of every combination of the values of ``axes``, the last axis fastest.
 
     ``fixed`` are the other parameters. Over the axes are ``count``, the number of flows of each point, and ``status``,
-    one of :class:`chuteflow.sweeps.outcome.Status`. The ``quantities`` have the flows of a point as a further axis,
-    from hot to cold, NaN (kinds: -1) where there are fewer. ``failures`` says why points failed, by their numbers.
+    one of :class:`chuteflow.sweeps.outcome.PointStatus`. The ``quantities`` have the flows of a point as a further
+    axis, from hot to cold, NaN (kinds: -1) where there are fewer. ``failures`` says why points failed, by their
+    numbers.
     """
 
     axes: Mapping[str, Array]
@@ -65,7 +66,7 @@ class Scan(Result):
     @cached_property
     def status_flags(self) -> dict[str, Any]:
         """What the values of ``status`` mean, as attributes."""
-        values, names = meanings(Status)
+        values, names = meanings(PointStatus)
         return {"flag_values": values, "flag_meanings": names}
 
     @staticmethod
@@ -106,7 +107,7 @@ def scan(
         tolerance: relative error allowed in Q, h and M.
         surface_temperature: range searched.
         largest_holdup: range searched.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
         parameters: ``slope``, ``restitution`` or ``e``, ``wall_restitution`` or ``ew``, ``roughness``, and one of
             ``Q``, ``M``, ``h`` and ``T_surface``: numbers, or one-dimensional arrays, which become axes in their order.
 

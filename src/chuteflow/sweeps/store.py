@@ -35,16 +35,17 @@ from numpy.typing import NDArray
 
 from chuteflow import __version__
 from chuteflow.errors import ChuteflowError, InputError
+from chuteflow.extras import require
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import shown_path
-from chuteflow.sweeps.judged import JUDGED_NUMBERS
 from chuteflow.sweeps.numbers import KINDS
-from chuteflow.sweeps.outcome import Reason, Status, meanings
+from chuteflow.sweeps.outcome import PointStatus, Reason, meanings
+from chuteflow.sweeps.stability import STABILITY_NUMBERS
 from chuteflow.sweeps.study import Column, Study, from_canonical
 
 _OWN, _DONE, _PARTIAL, _COLUMNS = ".chuteflow", "done", "partial", "columns"
-#: The file that holds the folder of the study, in which the laws of files are looked for.
+#: The file that holds the folder of the study, in which the laws of files are searched for.
 _FOLDER = "folder"
 _LEVEL = 1
 #: The version whose markers name none.
@@ -120,7 +121,7 @@ class Marker:
 
 
 @dataclass(frozen=True)
-class Variable:
+class StoreVariable:
     """One array of a store: its type, the value where nothing was computed, whether it has the dimension ``flow``
     besides ``point``, and its attributes."""
 
@@ -130,9 +131,9 @@ class Variable:
     attributes: dict[str, Any]
 
 
-def variables(study: Study) -> dict[str, Variable]:
+def variables(study: Study) -> dict[str, StoreVariable]:
     """All arrays of the store of a study."""
-    out: dict[str, Variable] = {}
+    out: dict[str, StoreVariable] = {}
     for name, axis in study.design.axes.items():
         words = axis.words
         attributes: dict[str, Any] = {"long_name": _LONG_NAMES[name]}
@@ -143,17 +144,17 @@ def variables(study: Study) -> dict[str, Variable]:
             }
         else:
             attributes |= {"units": "1"}
-        out[name] = Variable("int8" if words else "float64", -1 if words else float("nan"), False, attributes)
+        out[name] = StoreVariable("int8" if words else "float64", -1 if words else float("nan"), False, attributes)
     for name, flags, text in (
-        ("status", Status, "how the point ended"),
+        ("status", PointStatus, "how the point ended"),
         ("reason", Reason, "why the point has no flow"),
     ):
         values, names = meanings(flags)
         attributes = {"long_name": text, "flag_values": values.tolist(), "flag_meanings": names}
-        out[name] = Variable("int8", -1, False, attributes)
-    out["n_flows"] = Variable("int32", -1, False, {"long_name": "number of flows found", "units": "1"})
+        out[name] = StoreVariable("int8", -1, False, attributes)
+    out["n_flows"] = StoreVariable("int32", -1, False, {"long_name": "number of flows found", "units": "1"})
     text = "estimated relative error of Q, h and M, the largest"
-    out["error"] = Variable("float64", float("nan"), True, {"long_name": text, "units": "1"})
+    out["error"] = StoreVariable("float64", float("nan"), True, {"long_name": text, "units": "1"})
     for name in study.quantities:
         out[name] = _kind(name) if name in KINDS else _number(name)
     for variable in out.values():
@@ -161,15 +162,19 @@ def variables(study: Study) -> dict[str, Variable]:
     return out
 
 
-def _kind(name: str) -> Variable:
+def _kind(name: str) -> StoreVariable:
     attributes = {"flag_values": list(range(len(KINDS[name]))), "flag_meanings": " ".join(KINDS[name])}
-    return Variable("int8", -1, True, {"long_name": f"{name} of the flow"} | attributes)
+    return StoreVariable("int8", -1, True, {"long_name": f"{name} of the flow"} | attributes)
 
 
-def _number(name: str) -> Variable:
-    if name in JUDGED_NUMBERS:
-        attributes: dict[str, Any] = {"long_name": JUDGED_NUMBERS[name], "units": "1", "ancillary_variables": "stable"}
-        return Variable("float64", float("nan"), True, attributes)
+def _number(name: str) -> StoreVariable:
+    if name in STABILITY_NUMBERS:
+        attributes: dict[str, Any] = {
+            "long_name": STABILITY_NUMBERS[name],
+            "units": "1",
+            "ancillary_variables": "stable",
+        }
+        return StoreVariable("float64", float("nan"), True, attributes)
     quantity = NUMBERS[name]
     attributes = {
         "long_name": quantity.description,
@@ -178,7 +183,7 @@ def _number(name: str) -> Variable:
         "comment": f"{quantity.equation} of the paper",
         "ancillary_variables": "error status",
     }
-    return Variable("float64", float("nan"), True, attributes)
+    return StoreVariable("float64", float("nan"), True, attributes)
 
 
 @dataclass(frozen=True)
@@ -328,7 +333,7 @@ class Store:
         # Processors may differ in the last digit of a logarithm.
         same = all(np.allclose(arrays[name], values, rtol=1e-12, atol=0.0) for name, values in rows.items())
         counts = last - first == marker.points and int(arrays["n_flows"].sum()) == marker.flows
-        if not (same and counts and (arrays["status"] != Status.NOT_COMPUTED).all()):
+        if not (same and counts and (arrays["status"] != PointStatus.NOT_COMPUTED).all()):
             raise DamageError("its arrays are not those of its marker and of the study")
 
     def damaged_metadata(self) -> list[str]:
@@ -374,6 +379,7 @@ class Store:
 
     def _encoded(self, chunk: int, arrays: Mapping[str, NDArray[Any]]) -> dict[str, bytes]:
         """The files of a chunk, as Zarr writes them."""
+        _require_zarr()
         from zarr.storage import MemoryStore
 
         first, last = self.study.extent(chunk)
@@ -389,6 +395,7 @@ class Store:
 
     @staticmethod
     def _opened(place: Any) -> Any:
+        _require_zarr()
         import zarr
 
         return zarr.open_group(place, mode="r" if isinstance(place, Path) else "r+", use_consolidated=False)
@@ -477,7 +484,7 @@ def _folder(own: Path) -> Path:
 
 
 @lru_cache(maxsize=4)
-def _variables(study: Study) -> dict[str, Variable]:
+def _variables(study: Study) -> dict[str, StoreVariable]:
     return variables(study)
 
 
@@ -575,9 +582,14 @@ def _lay_out(path: Path, study: Study) -> None:
         _put(path / name, content)
 
 
+def _require_zarr() -> None:
+    require("zarr", "sweep", "a sweep")
+
+
 @lru_cache(maxsize=4)
 def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
     """The metadata of a store by their place in it, as Zarr writes them."""
+    _require_zarr()
     import zarr
     from zarr.codecs import BytesCodec, Crc32cCodec, ZstdCodec
     from zarr.storage import MemoryStore

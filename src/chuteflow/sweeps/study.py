@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import shown
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY, CONDITIONS, DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE
@@ -24,15 +24,15 @@ from chuteflow.steady.quantities import NUMBERS
 from chuteflow.sweeps.designs import (
     DESIGNS,
     MOST_POINTS,
-    Axis,
-    Design,
+    DesignAxis,
+    StudyDesign,
     axis_from,
     list_design,
     shown_key,
     shown_path,
 )
-from chuteflow.sweeps.judged import JUDGED_CHUNK, JUDGED_KINDS, JUDGED_NUMBERS, wanted
-from chuteflow.theory.bases import BASES, Base, base
+from chuteflow.sweeps.stability import STABILITY_CHUNK, STABILITY_KINDS, STABILITY_NUMBERS, needs_stability
+from chuteflow.theory.bases import BASES, BaseCondition, base
 from chuteflow.theory.constitutive import Law, digest
 from chuteflow.theory.laws import in_folder, law
 
@@ -50,7 +50,7 @@ _OPTIONAL = ("base",)
 #: Restitution and slope at which values of a law are taken, by which it is known again.
 _KNOWN_BY = (0.9, 0.3)
 #: Kinds of a flow that can be kept beside the numbers of the registry.
-KINDS = ("interior", "density", *JUDGED_KINDS)
+KINDS = ("interior", "density", *STABILITY_KINDS)
 DEFAULT_QUANTITIES = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 #: Points of a chunk: at a given surface temperature, and otherwise, when more has to be done for each.
 CHUNKS = {"T_surface": 32768}
@@ -74,7 +74,7 @@ class Study:
     """
 
     title: str
-    design: Design
+    design: StudyDesign
     condition: str
     quantities: tuple[str, ...] = DEFAULT_QUANTITIES
     flows: int = 8
@@ -87,7 +87,7 @@ class Study:
     columns: Mapping[str, Column] = field(default_factory=dict, compare=False, repr=False)
     #: The laws and the bases in the order of their numbers, and the folder to which those of files are relative.
     laws: tuple[Law, ...] = field(default=(), compare=False, repr=False)
-    bases: tuple[Base, ...] = field(default=(BASES["richman"],), compare=False, repr=False)
+    bases: tuple[BaseCondition, ...] = field(default=(BASES["richman"],), compare=False, repr=False)
     folder: Path = field(default_factory=Path, compare=False, repr=False)
 
     @property
@@ -138,7 +138,7 @@ def read(path: str | os.PathLike[str]) -> Study:
 
 def from_canonical(text: str, column: Callable[[str], Column] | None = None, folder: Path = Path()) -> Study:
     """The study of a canonical form, with ``column``, which gives the list of a parameter that is too long for it; laws
-    of files are looked for from ``folder``.
+    of files are searched for from ``folder``.
 
     Raises:
         InputError: for what is no canonical form, or a column that is not the one meant.
@@ -191,7 +191,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     if kind != "list":
         for axis in axes.values():
             _check_range(axis)
-    design = DESIGNS[kind].make(head, axes) if kind != "list" else Design.listed(axes)
+    design = DESIGNS[kind].make(head, axes) if kind != "list" else StudyDesign.listed(axes)
     if not 1 <= design.points <= MOST_POINTS:
         raise InputError(f"the design has {design.points} points: must be from 1 to {MOST_POINTS}")
     _only(search, "search.", ("tolerance", "surface_temperature", "largest_holdup"))
@@ -199,9 +199,9 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     tolerance = _number(search, "search.tolerance", TOLERANCE, 1e-10, 1e-3)
     deepest = _number(search, "search.largest_holdup", LARGEST_HOLDUP, SHALLOWEST, DEEPEST)
     warm = _interval(search.get("surface_temperature", SURFACE_TEMPERATURE))
-    Range.checked(warm, deepest)
+    SearchRange.checked(warm, deepest)
     quantities = _quantities(results.get("quantities", list(DEFAULT_QUANTITIES)))
-    chunk = JUDGED_CHUNK if wanted(quantities) else CHUNKS.get(condition, CHUNK)
+    chunk = STABILITY_CHUNK if needs_stability(quantities) else CHUNKS.get(condition, CHUNK)
     study = Study(
         title=_title(given),
         design=design,
@@ -252,7 +252,7 @@ def _law(name: str, folder: Path) -> Law:
         raise InputError(f"parameters.closure: {error}") from None
 
 
-def _base(name: str) -> Base:
+def _base(name: str) -> BaseCondition:
     try:
         return base(name)
     except InputError as error:
@@ -309,7 +309,7 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, str) else float(value)
 
 
-def _checked_names(axes: Mapping[str, Axis]) -> str:
+def _checked_names(axes: Mapping[str, DesignAxis]) -> str:
     """The condition among the parameters, once it is sure that they are complete."""
     known = (*RANGES, *WORDS)
     for name in axes:
@@ -325,7 +325,7 @@ def _checked_names(axes: Mapping[str, Axis]) -> str:
     return conditions[0]
 
 
-def _check_range(axis: Axis) -> None:
+def _check_range(axis: DesignAxis) -> None:
     if axis.name in WORDS:
         return
     low, high = RANGES[axis.name]
@@ -335,7 +335,7 @@ def _check_range(axis: Axis) -> None:
 
 
 def _quantities(names: Any) -> tuple[str, ...]:
-    known = (*NUMBERS, *KINDS, *JUDGED_NUMBERS)
+    known = (*NUMBERS, *KINDS, *STABILITY_NUMBERS)
     if not isinstance(names, list) or not names:
         raise InputError(f"results.quantities = {shown(names)}: must be a list of names, from {', '.join(known)}")
     for name in names:

@@ -27,9 +27,9 @@ def sweep(
 
     Args:
         study: a TOML file, its table as a dictionary, or a study.
-        out: the store to make or go on with.
+        out: the store to create or continue.
         workers: processes; one for each core by default.
-        progress: called with the share that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         InputError: for a study that is none, or a store that is of another one.

@@ -24,7 +24,7 @@ from chuteflow.theory.constitutive import Field, Reduced
 
 
 @dataclass(frozen=True)
-class Base:
+class BaseCondition:
     """A condition at the base."""
 
     @property
@@ -46,7 +46,7 @@ class Base:
         function."""
 
     def checked_roughness(self, value: Any) -> float:
-        """The roughness once it is sure that it can be asked for.
+        """The roughness, checked to be in the range of the condition.
 
         Raises:
             InputError: for one out of range.
@@ -58,7 +58,7 @@ class Base:
         """The parameters by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def stepped(self, name: str) -> Base:
+    def stepped(self, name: str) -> BaseCondition:
         """The base with one of its parameters an imaginary step further (:mod:`chuteflow.numerics.complex_step`)."""
         found = copy(self)
         object.__setattr__(found, name, stepped(getattr(self, name)))
@@ -70,7 +70,7 @@ class Base:
 
 
 @dataclass(frozen=True)
-class Richman(Base):
+class Richman(BaseCondition):
     """Hemispheres on a plane, (2.8)-(2.15): Richman 1988.
 
     Args:
@@ -89,7 +89,7 @@ class Richman(Base):
 
     def functions(self, reduced: Reduced) -> tuple[Field, Field]:
         """g1/g2 and A g1/g2, with A of (2.12) for grains and hemispheres of one size."""
-        return reduced.shear, reduced.grip
+        return reduced.shear, reduced.wall_shear
 
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1 of (3.16): with dbar = (1 + diameter)/2 for the diameter d before the shear rate in (2.10), and in A."""
@@ -125,8 +125,8 @@ class Richman(Base):
 
 
 @dataclass(frozen=True)
-class JohnsonJackson(Base):
-    """A wall that takes a share of the tangential momentum: Johnson & Jackson 1987. The roughness does not enter.
+class JohnsonJackson(BaseCondition):
+    """A wall that takes a fraction of the tangential momentum: Johnson & Jackson 1987. The roughness does not enter.
 
     F1 = s g1 6 nu*/(pi sqrt(3) phi nu g0), and the loss over g1 is (pi sqrt(3)/(4 nu*)) (1 - e_w^2) nu g0.
 
@@ -163,16 +163,16 @@ class JohnsonJackson(Base):
 
 
 #: The bases by name, with the parameters that they have unless others are given.
-BASES: dict[str, Base] = {base.name: base for base in (Richman(), JohnsonJackson())}
+BASES: dict[str, BaseCondition] = {base.name: base for base in (Richman(), JohnsonJackson())}
 
 
-def base(asked: str | Base) -> Base:
+def base(asked: str | BaseCondition) -> BaseCondition:
     """The base that ``asked`` means: itself, or that of a text such as "richman:diameter=1.5".
 
     Raises:
         InputError: for an unknown name or parameter, or a value out of range.
     """
-    if isinstance(asked, Base):
+    if isinstance(asked, BaseCondition):
         return asked
     name, _, said = asked.partition(":") if isinstance(asked, str) else (asked, "", "")
     if not isinstance(name, str) or name not in BASES:
@@ -190,7 +190,7 @@ def base(asked: str | Base) -> Base:
     return replace(BASES[name], **settings)
 
 
-def require_richman(asked: str | Base, what: str) -> None:
+def require_richman(asked: str | BaseCondition, what: str) -> None:
     """Check that the base is Richman's with hemispheres as large as the grains, as in the paper.
 
     Raises:

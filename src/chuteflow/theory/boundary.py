@@ -12,7 +12,7 @@ import math
 from chuteflow.parameters import PARAMETERS
 from chuteflow.theory.constitutive import Field
 
-#: Normal stress at the interface of Jenkins & Hanes (1993), (3.31) with its misprint mended.
+#: Normal stress at the interface of Jenkins & Hanes (1993), (3.31) with its misprint corrected.
 INTERFACE_STRESS = math.sqrt(math.pi) / 48.0
 
 #: Range of the roughness for wall grains of the size of the flowing ones, section 2.2.
@@ -25,13 +25,13 @@ def kappa(roughness: float) -> float:
     return 2.0 / 3.0 * (2.0 / (1.0 + lid) - lid)
 
 
-def slip_coefficient(shear: Field, grip: Field, roughness: float, slope: float) -> Field:
-    """F1 of (3.16), slip velocity over sqrt(T); ``shear`` = g1/g2 and ``grip`` = A g1/g2 at the base.
+def slip_coefficient(shear: Field, wall_shear: Field, roughness: float, slope: float) -> Field:
+    """F1 of (3.16), slip velocity over sqrt(T); ``shear`` = g1/g2 and ``wall_shear`` = A g1/g2 at the base.
 
     It follows from the balance of momentum (3.11)-(3.14), with A in (3.13), where the paper has it not.
     """
     k = kappa(roughness)
-    return slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * roughness**2 * grip)
+    return slope / k * (math.sqrt(math.pi / 2.0) + k * shear - 0.5 * roughness**2 * wall_shear)
 
 
 def base_loss(wall_restitution: float, roughness: float) -> float:

@@ -90,7 +90,7 @@ class Law:
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
     is a function of nu and the slope. ``breaks`` are the volume fractions at which a coefficient is not smooth, or
     a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
-    the text by which it was asked for, where that was not its name, see :mod:`chuteflow.theory.laws`.
+    the text by which it was requested, where that was not its name, see :mod:`chuteflow.theory.laws`.
 
     ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, rate)``, the
     coefficients where the shear rate over nu sqrt(T) is ``rate``, for disturbed flows of a law that ``knows_slope``.
@@ -205,9 +205,9 @@ class Reduced:
     - ``conduction`` = g3 nu/g1, with which y = conduction dtheta/dp;
     - ``drift`` = nu g4/g3, with theta = ln T - Gamma and dGamma/dln nu = drift; where dilute it is -b, and b is 0 but
       for laws whose g4 grows like 1/nu; ``coupling`` = (drift + b)/nu;
-    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation less production is loss - s^2 work;
+    - ``loss`` = g5/(nu g1) and ``work`` = g1/(nu g2): dissipation minus production is loss - s^2 work;
     - ``shear`` = g1/g2, with du/dz = s shear sqrt(T) (3.10);
-    - ``grip`` = A g1/g2, of the slip condition (3.16);
+    - ``wall_shear`` = A g1/g2, of the slip condition (3.16);
     - ``radial`` = g0, ``compressibility`` = G = g1/nu and ``stiffness`` = d ln g1 / d ln nu.
     """
 
@@ -217,7 +217,7 @@ class Reduced:
     loss: Field
     work: Field
     shear: Field
-    grip: Field
+    wall_shear: Field
     radial: Field
     compressibility: Field
     stiffness: Field
@@ -243,7 +243,7 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
         loss=g.dissipation / big_g,
         work=big_g / g.viscosity,
         shear=nu * big_g / g.viscosity,
-        grip=big_g * nu_contact / g.viscosity,
+        wall_shear=big_g * nu_contact / g.viscosity,
         radial=g.radial,
         compressibility=big_g,
         stiffness=1.0 + nu * g.compressibility_slope / big_g,
@@ -311,6 +311,12 @@ def require_positive(law: Law, e: float, slope: float) -> None:
     Raises:
         InputError: where ``law`` loses its meaning at restitution ``e``, naming the function and the density.
     """
+    _require_positive(law, e, slope if law.knows_slope else 1.0)
+
+
+# Maps ask for thousands of chutes of the same grains.
+@lru_cache(maxsize=256)
+def _require_positive(law: Law, e: float, slope: float) -> None:
     nu, _, g = law.at(_TRIED, e, slope)
     if not isinstance(g, Coefficients):
         raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")

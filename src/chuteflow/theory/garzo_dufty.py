@@ -63,14 +63,14 @@ class GarzoDufty(Formula):
             density_flux, density_conductivity = None, np.zeros_like(kappa)
         else:
             pressure_slope = compressibility + nu * 2.0 * f * x_slope  # d(nu p*)/dnu
-            lever = nu * log_slope
+            slope_term = nu * log_slope
             mixed = e * lost + 0.25 * c * (4.0 / 3.0 + e * lost)
             kinetic_mu = (
                 2.0
                 * (
-                    (1.0 + lever) * zeta * kinetic_kappa
+                    (1.0 + slope_term) * zeta * kinetic_kappa
                     + pressure_slope * c / 3.0
-                    - 0.8 * x * (1.0 + 0.5 * lever) * f * mixed
+                    - 0.8 * x * (1.0 + 0.5 * slope_term) * f * mixed
                 )
                 / (2.0 * rate_kappa - 3.0 * zeta)
             )

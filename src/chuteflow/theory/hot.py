@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chuteflow.errors import InputError
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import Field, Law, reduce
 
@@ -71,8 +71,8 @@ def dilute(law: Law, e: float, slope: float) -> Dilute:
     )
     if not (all(map(math.isfinite, (g20, g30, g40, g52))) and g20 > 0.0 and g30 > 0.0):
         raise InputError(f"closure {law.name!r} has no dilute limit at e = {e}: take another closure")
-    grip = reduce(law, np.zeros(1), e, slope).grip
-    return Dilute(g20, g30, g40, g52, float(grip[0]) * g20)
+    wall_shear = reduce(law, np.zeros(1), e, slope).wall_shear
+    return Dilute(g20, g30, g40, g52, float(wall_shear[0]) * g20)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class HotParameters:
 
     ``F10`` slip velocity over sqrt(T) at the base (4.2), with r^2 A0/(2 g20) for r^2 A0 g20/2 as printed: the
     limit of (3.16), as in (4.3); ``F21`` heat flux from the base over nu T^(3/2) (4.3); ``delta`` dissipation
-    less production in the interior over nu^2 T^(3/2) (4.9).
+    minus production in the interior over nu^2 T^(3/2) (4.9).
     """
 
     slope: float
@@ -102,14 +102,14 @@ class HotParameters:
 
     @property
     def mu(self) -> float:
-        """Share of shear in the velocity (4.16); infinite where F21 = 0."""
+        """Fraction of shear in the velocity (4.16); infinite where F21 = 0."""
         return self.alpha * self.slope / (self.F10 * self.dilute.g20)
 
     @property
     def obstacle(self) -> str | None:
         """One sentence on why there is no hot flow; None where there is one, and then there is just one.
 
-        The signs of F21 and delta are looked at apart: that of lambda is always that of delta.
+        The signs of F21 and delta are examined apart: that of lambda is always that of delta.
         """
         base, interior = np.sign(self.F21), -np.sign(self.delta)
         if base > 0.0 > interior:
@@ -153,8 +153,8 @@ def hot_parameters(limit: Dilute, wall_restitution: float, roughness: float, slo
 
 
 def _slip(limit: Dilute, roughness: float, slope: float) -> float:
-    no_shear, grip = np.zeros(1), np.full(1, limit.A0 / limit.g20)
-    F10 = float(boundary.slip_coefficient(no_shear, grip, roughness, slope)[0])
+    no_shear, wall_shear = np.zeros(1), np.full(1, limit.A0 / limit.g20)
+    F10 = float(boundary.slip_coefficient(no_shear, wall_shear, roughness, slope)[0])
     if F10 <= 0.0:
         raise InputError(f"slip velocity F10 = {F10}: must be positive, as it is for a larger viscosity g20")
     return F10
@@ -164,7 +164,7 @@ def _slip(limit: Dilute, roughness: float, slope: float) -> float:
 
 
 @dataclass(frozen=True)
-class Budget:
+class HotEnergyBudget:
     """Energy lost and made, ``l`` and ``m`` tan^2 at the base (4.26), ``L`` and ``M`` tan^2 inside (4.25).
 
     L and M are for one value of lambda, which hot flows have where (m tan^2 - l)^2 = L - M tan^2 (4.27).
@@ -176,11 +176,11 @@ class Budget:
     M: float
 
 
-def budget(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> Budget:
+def budget(limit: Dilute, wall_restitution: float, roughness: float, lambda_: float) -> HotEnergyBudget:
     """The energy budget (4.25), (4.26) for one value of lambda, of either sign."""
     root = math.sqrt(math.pi / 2.0)
     inside = math.pi * lambda_ * limit.g30 / 3.0
-    return Budget(
+    return HotEnergyBudget(
         l=root * boundary.base_loss(wall_restitution, roughness),
         m=root * _slip(limit, roughness, 1.0),
         L=inside * limit.g52,
@@ -367,7 +367,7 @@ def hot_solution(lambda_: float) -> HotSolution:
     """
     if not (math.isfinite(lambda_) and lambda_ < LAMBDA_C and lambda_ != 0.0):
         raise InputError(f"lambda = {lambda_}: hot flows have a lambda below 3, other than 0")
-    return HotSolution(lambda_, bisected(*_base_condition(lambda_)))
+    return HotSolution(lambda_, bisect(*_base_condition(lambda_)))
 
 
 def _base_condition(lambda_: float) -> tuple[Callable[[float], float], float, float]:
@@ -406,7 +406,7 @@ def _inversion() -> float:
     """x at which 2 x I_1(x)/I_0(x) = 1."""
     from scipy.special import i0e, i1e
 
-    return bisected(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
+    return bisect(lambda x: 2.0 * x * i1e(x) - i0e(x), 0.5, 2.0)
 
 
 def _c0(y: Field, sign: float) -> Field:

@@ -174,7 +174,7 @@ _RUN: set[str] = set()
 
 @lru_cache(maxsize=32)
 def _module(path: str, stamp: tuple[int, int]) -> Any:
-    """The module in a file; imported anew where the file has changed."""
+    """The module in a file; imported again where the file has changed."""
     name = f"chuteflow_closure_{abs(hash((path, stamp))):x}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

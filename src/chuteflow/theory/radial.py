@@ -79,12 +79,12 @@ def torquato(nu: Field, room: Field, packing: float) -> tuple[Field, Field]:
 
 def ma_ahmadi(nu: Field, room: Field, packing: float) -> tuple[Field, Field]:
     """(1 + 2.5 nu + 4.5904 nu^2 + 4.515439 nu^3)/(1 - (nu/nu_c)^3)^0.67802."""
-    share = nu / packing
+    fraction = nu / packing
     top = 1.0 + nu * (2.5 + nu * (4.5904 + nu * 4.515439))
     top_slope = 2.5 + nu * (2.0 * 4.5904 + nu * 3.0 * 4.515439)
     # 1 - share^3, without cancellation near the packing
-    left = room * (1.0 + share * (1.0 + share))
-    return top * left**-0.67802, top_slope / top + 0.67802 * 3.0 * share**2 / (packing * left)
+    left = room * (1.0 + fraction * (1.0 + fraction))
+    return top * left**-0.67802, top_slope / top + 0.67802 * 3.0 * fraction**2 / (packing * left)
 
 
 def vescovi(nu: Field, room: Field, packing: float) -> tuple[Field, Field]:

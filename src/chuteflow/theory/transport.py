@@ -43,7 +43,7 @@ class Fields:
 
 
 @dataclass(frozen=True)
-class Grains:
+class Material:
     """What the equations need to know of the grains and the chute: law, restitution and slope."""
 
     law: Law
@@ -79,7 +79,7 @@ class Motion:
     inertia: tuple[Number, ...]
 
 
-def motion(fields: Fields, gradient: Gradient, grains: Grains) -> Motion:
+def motion(fields: Fields, gradient: Gradient, grains: Material) -> Motion:
     """Everything in (2.1)-(2.7) for ``fields``."""
     nu, T = exp(fields.log_density), exp(fields.log_temperature)
     root_T = exp(0.5 * fields.log_temperature)
@@ -111,10 +111,10 @@ def motion(fields: Fields, gradient: Gradient, grains: Grains) -> Motion:
     )
 
 
-def closures(grains: Grains, nu: Number, rate: Callable[[], Number]) -> list[Number]:
+def closures(grains: Material, nu: Number, rate: Callable[[], Number]) -> list[Number]:
     """g0 to g6 of table 1 at ``nu``, in the order radial, g1, g2, g3, g4, g5, g6.
 
-    ``rate`` gives the shear rate over nu sqrt(T); it is asked for where the dissipation of the law depends on it.
+    ``rate`` gives the shear rate over nu sqrt(T); it is requested where the dissipation of the law depends on it.
     """
     law, e = grains.law, grains.restitution
     if law.knows_slope:

@@ -3,8 +3,8 @@
 # notation: P overburden, p = P + p_S normal stress, L, y, a, k, net, b as in chuteflow.trajectories.tables;
 # A = (1 - k)/(2 a), c = 1 + k/2; B = y - b the residual of the base condition; tau = ln P + P/p_1 the step variable.
 
-With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0
-for most laws. Close to a free surface these are (3.20)-(3.22). All arrays of a row are in the order of the curve.
+With these, dL/dp = (1 + beta)/p - y/a and dy/dp = net - A y^2 - c y/p; beta is 0 for most laws. Close to a free surface
+these are (3.20)-(3.22). The arrays of a depth step are in the order of the curve.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ FREE, HOT, LOW_FLUX, COLD, BEYOND = range(5)
 DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 #: States are no longer advanced where y is below this multiple of the scale of fluxes, or L above this.
 _COLDEST, _DENSEST = -8.0, 55.0
-#: Places between two states at which the residual is looked at.
+#: Places between two states at which the residual is examined.
 _BETWEEN = 5
-#: Trajectories inserted into one interval in one row at most.
+#: Trajectories inserted into one interval in one depth step at most.
 _MOST_INSERTED = 12
-#: The series at the surface of the half-line is used up to this share of T.
+#: The series at the surface of the half-line is used up to this fraction of T.
 START = 0.05
 #: Reasons why the curve ends.
 DONE, FULL = range(2)
 
 
 @compiled
-def look_up(values: Any, big_l: float, column: int) -> float:
+def interpolate_table(values: Any, big_l: float, column: int) -> float:
     """One function of the table, linear between entries."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
@@ -67,7 +67,7 @@ def look_up(values: Any, big_l: float, column: int) -> float:
 
 
 @compiled
-def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, float]:
+def _evaluate_derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, float]:
     """dL/dp and dy/dp."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
@@ -80,7 +80,7 @@ def _derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, f
 
 
 @compiled
-def _integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[float, float]:
+def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[float, float]:
     """P/nu and P du/dp, where ``shear`` is slope P sqrt(p)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
@@ -92,7 +92,7 @@ def _integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[f
 
 
 @compiled
-def _lengths(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
+def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
     """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau and slope P sqrt(p) at its ends and
     middle into ``out`` (3, 3)."""
     half_tau = 0.5 * (math.log(after / over) + (after - over) / p_1)
@@ -110,54 +110,58 @@ def _lengths(slope: float, p_s: float, p_1: float, over: float, after: float, ou
 
 
 @compiled
-def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, rows: Any, j: int) -> None:
-    """One step of state ``j`` by the classical Runge-Kutta method in tau, of which :func:`_lengths` tells the lengths;
-    integrals by Simpson."""
+def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
+    """One step of state ``j`` by the classical Runge-Kutta method in tau, for which :func:`_prepare_step` gives the
+    lengths; integrals by Simpson."""
     p_0, p_m, p_1 = lengths[0, 0] + p_s, lengths[1, 0] + p_s, lengths[2, 0] + p_s
     rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]
-    big_l, y = rows[j, S_L], rows[j, S_Y]
-    l_1, y_1 = _derivative(values, p_0, big_l, y)
-    l_2, y_2 = _derivative(values, p_m, big_l + half_tau * rate_0 * l_1, y + half_tau * rate_0 * y_1)
-    l_3, y_3 = _derivative(values, p_m, big_l + half_tau * rate_m * l_2, y + half_tau * rate_m * y_2)
+    big_l, y = curve[j, S_L], curve[j, S_Y]
+    l_1, y_1 = _evaluate_derivative(values, p_0, big_l, y)
+    l_2, y_2 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_0 * l_1, y + half_tau * rate_0 * y_1)
+    l_3, y_3 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_m * l_2, y + half_tau * rate_m * y_2)
     l_m = big_l + half_tau * rate_m * l_3
-    l_4, y_4 = _derivative(values, p_1, big_l + 2.0 * half_tau * rate_m * l_3, y + 2.0 * half_tau * rate_m * y_3)
+    l_4, y_4 = _evaluate_derivative(
+        values, p_1, big_l + 2.0 * half_tau * rate_m * l_3, y + 2.0 * half_tau * rate_m * y_3
+    )
     third = half_tau / 3.0
-    rows[j, S_L] = big_l + third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
-    rows[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
-    h_0, g_0 = _integrands(values, lengths[0, 0], lengths[0, 2], big_l)
-    h_m, g_m = _integrands(values, lengths[1, 0], lengths[1, 2], l_m)
-    h_1, g_1 = _integrands(values, lengths[2, 0], lengths[2, 2], rows[j, S_L])
-    rows[j, S_H] += third * (h_0 * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
-    rows[j, S_G] += third * (g_0 * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+    curve[j, S_L] = big_l + third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
+    curve[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
+    h_0, g_0 = _evaluate_integrands(values, lengths[0, 0], lengths[0, 2], big_l)
+    h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
+    h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], curve[j, S_L])
+    curve[j, S_H] += third * (h_0 * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
+    curve[j, S_G] += third * (g_0 * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
 
 
 @compiled
-def _start(values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, rows: Any, j: int) -> None:
+def _start_at_surface(
+    values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, curve: Any, j: int
+) -> None:
     """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
     if p_s == 0.0:
         beta = values[0, BETA]
         half = values[0, NET] / (2.0 - 0.5 * beta)
         big_l = (1.0 + beta) * math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
-        v = over**2 * half * look_up(values, big_l, INVERSE) - beta
-        net, k = look_up(values, big_l, NET), look_up(values, big_l, COUPLED)
+        v = over**2 * half * interpolate_table(values, big_l, INVERSE) - beta
+        net, k = interpolate_table(values, big_l, NET), interpolate_table(values, big_l, COUPLED)
         share = 3.0 + 0.5 * beta
         heating = v + k * (1.0 - v) + beta
-        rows[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
+        curve[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
         fraction = 1.0 / (1.0 - beta)
     else:
         big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
-        l_p, y_p = _derivative(values, p_s, big_l, y_s)
+        l_p, y_p = _evaluate_derivative(values, p_s, big_l, y_s)
         big_l += over * l_p
-        rows[j, S_Y] = y_s + over * y_p
+        curve[j, S_Y] = y_s + over * y_p
         fraction = 0.5
-    rows[j, S_L] = big_l
-    h, g = _integrands(values, over, slope * over * math.sqrt(over + p_s), big_l)
-    rows[j, S_H] = fraction * h * over
-    rows[j, S_G] = 0.5 * g * over
+    curve[j, S_L] = big_l
+    h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), big_l)
+    curve[j, S_H] = fraction * h * over
+    curve[j, S_G] = 0.5 * g * over
 
 
 @compiled
-def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
+def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
     """The invariant region in which a state lies: from there on B keeps its sign (docs/theory/enumeration.md)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
@@ -181,29 +185,29 @@ def region_of(bounds: Any, p: float, big_l: float, y: float) -> int:
 
 
 @compiled
-def _region(bounds: Any, p: float, rows: Any, j: int, asked: tuple[float, float, float]) -> int:
+def _find_region_or_limit(bounds: Any, p: float, curve: Any, j: int, limits: tuple[float, float, float]) -> int:
     """The region of a state; BEYOND where its flux by shear, which grows downwards, is larger than the first of what is
-    ``asked``, and ln T_surface between the others."""
-    if rows[j, S_G] > asked[0] and asked[1] < rows[j, S_T] < asked[2]:
+    ``limits``, and ln T_surface between the others."""
+    if curve[j, S_G] > limits[0] and limits[1] < curve[j, S_T] < limits[2]:
         return BEYOND
-    return region_of(bounds, p, rows[j, S_L], rows[j, S_Y])
+    return find_region(bounds, p, curve[j, S_L], curve[j, S_Y])
 
 
 @compiled
-def _place(big_l: float) -> float:
+def _scale_density(big_l: float) -> float:
     """L as distances count it."""
     return big_l if big_l > DILUTE else DILUTE + DILUTE_WEIGHT * (big_l - DILUTE)
 
 
 @compiled
-def _distance(rows: Any, j: int, per_flux: float) -> float:
+def _measure_distance(curve: Any, j: int, per_flux: float) -> float:
     """Of position j of the curve from the next."""
-    apart = _place(rows[j, S_L]) - _place(rows[j + 1, S_L])
-    return math.sqrt(apart * apart + ((rows[j, S_Y] - rows[j + 1, S_Y]) * per_flux) ** 2)
+    apart = _scale_density(curve[j, S_L]) - _scale_density(curve[j + 1, S_L])
+    return math.sqrt(apart * apart + ((curve[j, S_Y] - curve[j + 1, S_Y]) * per_flux) ** 2)
 
 
 @compiled
-def _limited_slope(before: float, after: float, d_before: float, d_after: float) -> float:
+def _limit_slope(before: float, after: float, d_before: float, d_after: float) -> float:
     """Slope at a point between two secants that keeps the interpolant monotonic (Fritsch & Butland 1984)."""
     one, two = before / d_before, after / d_after
     if one * two <= 0.0:
@@ -213,50 +217,52 @@ def _limited_slope(before: float, after: float, d_before: float, d_after: float)
 
 
 @compiled
-def _interpolate(rows: Any, j: int, n: int, open_: Any, length: Any, t: float, out: Any, k: int) -> None:
+def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, t: float, out: Any, k: int) -> None:
     """The state at ``t`` of the way from position j of the curve to the next, into ``out[k]``: a monotonic cubic."""
     d = length[j]
-    for q in range(rows.shape[1]):
-        rise = rows[j + 1, q] - rows[j, q]
+    for q in range(curve.shape[1]):
+        rise = curve[j + 1, q] - curve[j, q]
         left = right = rise / d
-        if j > 0 and open_[j - 1]:
-            left = _limited_slope(rows[j, q] - rows[j - 1, q], rise, length[j - 1], d)
-        if j + 2 < n and open_[j + 1]:
-            right = _limited_slope(rise, rows[j + 2, q] - rows[j + 1, q], d, length[j + 1])
+        if j > 0 and connected[j - 1]:
+            left = _limit_slope(curve[j, q] - curve[j - 1, q], rise, length[j - 1], d)
+        if j + 2 < n and connected[j + 1]:
+            right = _limit_slope(rise, curve[j + 2, q] - curve[j + 1, q], d, length[j + 1])
         # One-sided slopes at the ends of a piece are those of the chord.
-        out[k, q] = rows[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
+        out[k, q] = (
+            curve[j, q] + t * rise + t * (1.0 - t) * d * ((1.0 - t) * (left - rise / d) - t * (right - rise / d))
+        )
 
 
 @compiled
-def _bend(rows: Any, j: int, n: int, open_: Any, length: Any, q: int) -> tuple[float, float]:
+def _measure_bend(curve: Any, j: int, n: int, connected: Any, length: Any, q: int) -> tuple[float, float]:
     """How much more quantity ``q`` changes by its slopes at position j of the curve, and at the next, than between
     them: the slopes are those of parabolas through three positions."""
     d = length[j]
-    rise = rows[j + 1, q] - rows[j, q]
+    rise = curve[j + 1, q] - curve[j, q]
     left = right = 0.0
-    if j > 0 and open_[j - 1]:
-        left = ((rows[j, q] - rows[j - 1, q]) * d / length[j - 1] - rise) * d / (d + length[j - 1])
-    if j + 2 < n and open_[j + 1]:
-        right = ((rows[j + 2, q] - rows[j + 1, q]) * d / length[j + 1] - rise) * d / (d + length[j + 1])
+    if j > 0 and connected[j - 1]:
+        left = ((curve[j, q] - curve[j - 1, q]) * d / length[j - 1] - rise) * d / (d + length[j - 1])
+    if j + 2 < n and connected[j + 1]:
+        right = ((curve[j + 2, q] - curve[j + 1, q]) * d / length[j + 1] - rise) * d / (d + length[j + 1])
     return left, right
 
 
 @compiled
-def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: Any, length: Any) -> bool:
+def _hides_zeros(values: Any, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any) -> bool:
     """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
     where it does along the cubic through the two states, or comes half of the way to it."""
     before, last = residual[j], residual[j + 1]
     least = min(abs(before), abs(last))
-    rise_l, rise_y = rows[j + 1, S_L] - rows[j, S_L], rows[j + 1, S_Y] - rows[j, S_Y]
-    left_l, right_l = _bend(rows, j, n, open_, length, S_L)
-    left_y, right_y = _bend(rows, j, n, open_, length, S_Y)
+    rise_l, rise_y = curve[j + 1, S_L] - curve[j, S_L], curve[j + 1, S_Y] - curve[j, S_Y]
+    left_l, right_l = _measure_bend(curve, j, n, connected, length, S_L)
+    left_y, right_y = _measure_bend(curve, j, n, connected, length, S_Y)
     changes = 0
     nearest = least
     for c in range(1, _BETWEEN + 1):
         t = c / (_BETWEEN + 1.0)
-        big_l = rows[j, S_L] + t * (rise_l + (1.0 - t) * ((1.0 - t) * left_l - t * right_l))
-        y = rows[j, S_Y] + t * (rise_y + (1.0 - t) * ((1.0 - t) * left_y - t * right_y))
-        here = y - look_up(values, big_l, BASE)
+        big_l = curve[j, S_L] + t * (rise_l + (1.0 - t) * ((1.0 - t) * left_l - t * right_l))
+        y = curve[j, S_Y] + t * (rise_y + (1.0 - t) * ((1.0 - t) * left_y - t * right_y))
+        here = y - interpolate_table(values, big_l, BASE)
         changes += int((here >= 0.0) != (before >= 0.0))
         nearest = min(nearest, abs(here))
         before = here
@@ -267,8 +273,8 @@ def _hides_zeros(values: Any, rows: Any, residual: Any, j: int, n: int, open_: A
 
 
 @compiled
-def _grown(array: Any, size: int) -> Any:
-    """The array with room for ``size`` rows at least."""
+def _grow(array: Any, size: int) -> Any:
+    """The array, enlarged where needed to a length of at least ``size``."""
     if size <= len(array):
         return array
     shape = (max(size, 2 * len(array)), *array.shape[1:])
@@ -278,7 +284,7 @@ def _grown(array: Any, size: int) -> Any:
 
 
 @compiled
-def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
+def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
     """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to
     join neighbours the one with the shorter lines."""
     even = odd = 0.0
@@ -297,7 +303,7 @@ def _match(nodes: Any, places: Any, count: int, links: Any) -> None:
 
 
 @compiled
-def carry(
+def integrate(
     values: Any,
     bounds: Any,
     slope: float,
@@ -314,13 +320,13 @@ def carry(
     most: int,
     largest_flux: float,
 ) -> tuple[Any, ...]:
-    """Carry the curve of states down the rows ``overburden`` (R,) from surface temperatures ``log_t`` (C,) ascending,
-    and no further than to where the flux by shear alone is larger than ``largest_flux``.
+    """Integrate the curve of states down the depth steps ``overburden`` (R,) from surface temperatures ``log_t`` (C,)
+    ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``.
 
-    Returns the states of all rows (N, 5), the place in the row before from which each came (N,), between two states
-    where it was inserted, whether the curve goes on from each to the next (N,), the first position of each row
-    (R + 1,), the first states of the cells that could not be decided (U,), how many cells were looked at, and how the
-    curve ended.
+    Returns the states of all depth steps (N, 5), the place in the step before from which each came (N,), between two
+    states where it was inserted, whether the curve continues from each to the next (N,), the first position of each
+    step (R + 1,), the first states of the cells that could not be decided (U,), how many cells were examined, and how
+    the curve ended.
     """
     n = len(log_t)
     states = np.empty((64 * n + 1024, 5))
@@ -332,152 +338,152 @@ def carry(
     status = DONE
 
     # The curve: n positions in use of these.
-    rows = np.empty((4 * n, 5))
-    theta = np.empty(len(rows))  # heat potential at the surface
-    in_series = np.zeros(len(rows), np.bool_)
-    frozen = np.zeros(len(rows), np.bool_)  # no longer advanced
-    open_ = np.ones(len(rows), np.bool_)  # whether the curve goes on to the next position
-    region = np.empty(len(rows), np.int64)
-    residual = np.empty(len(rows))
-    length = np.empty(len(rows))  # distance from the next position
-    # The same positions in the row before: place among the states, and where they are now, since some are inserted
+    curve = np.empty((4 * n, 5))
+    theta = np.empty(len(curve))  # heat potential at the surface
+    in_series = np.zeros(len(curve), np.bool_)
+    stopped = np.zeros(len(curve), np.bool_)  # no longer advanced
+    connected = np.ones(len(curve), np.bool_)  # whether the curve continues to the next position
+    region = np.empty(len(curve), np.int64)
+    residual = np.empty(len(curve))
+    length = np.empty(len(curve))  # distance from the next position
+    # The same positions in the step before: place among the states, and where they are now, since some are inserted
     # between.
-    above = np.full(len(rows), -1, np.int64)
-    moved = np.empty(len(rows), np.int64)
-    wanted = np.empty(len(rows), np.int64)  # how many to insert after a position
-    inserted = np.empty((len(rows), 5))
+    previous = np.full(len(curve), -1, np.int64)
+    shifted = np.empty(len(curve), np.int64)
+    n_inserted = np.empty(len(curve), np.int64)  # how many to insert after a position
+    inserted = np.empty((len(curve), 5))
     lengths = np.empty((3, 3))
     theta[:n] = theta_s
-    rows[:n, S_T] = log_t
+    curve[:n, S_T] = log_t
     # The outermost trajectories tell where branches lead out of the range.
-    asked = largest_flux, log_t[1], log_t[n - 2]
+    limits = largest_flux, log_t[1], log_t[n - 2]
 
-    for row in range(len(overburden)):
-        over = overburden[row]
+    for step in range(len(overburden)):
+        over = overburden[step]
         p = over + p_s
         # Advance.
-        half_tau = _lengths(slope, p_s, p_1, overburden[row - 1], over, lengths) if row > 0 else 0.0
+        half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths) if step > 0 else 0.0
         for j in range(n):
-            if row == 0 or in_series[j]:
+            if step == 0 or in_series[j]:
                 log_scale = theta[j] / (1.0 + values[0, BETA])
-                in_series[j] = p_s == 0.0 and (row == 0 or over <= min(START * math.exp(log_scale), start_at_most))
-                if row == 0 or in_series[j]:
-                    _start(values, slope, p_s, y_s, theta[j], over, rows, j)
+                in_series[j] = p_s == 0.0 and (step == 0 or over <= min(START * math.exp(log_scale), start_at_most))
+                if step == 0 or in_series[j]:
+                    _start_at_surface(values, slope, p_s, y_s, theta[j], over, curve, j)
                     continue
-            if not frozen[j]:
-                _advance(values, p_s, half_tau, lengths, rows, j)
-                if not (rows[j, S_Y] > _COLDEST / per_flux) or rows[j, S_L] > _DENSEST:
-                    rows[j, S_Y] = _COLDEST / per_flux
-                    rows[j, S_L] = min(max(rows[j, S_L], LOW), _DENSEST)
-                    if not math.isfinite(rows[j, S_H]):
-                        rows[j, S_H] = 1e300
-                    if not math.isfinite(rows[j, S_G]):
-                        rows[j, S_G] = 1e300
-                    frozen[j] = True
+            if not stopped[j]:
+                _advance(values, p_s, half_tau, lengths, curve, j)
+                if not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST:
+                    curve[j, S_Y] = _COLDEST / per_flux
+                    curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
+                    if not math.isfinite(curve[j, S_H]):
+                        curve[j, S_H] = 1e300
+                    if not math.isfinite(curve[j, S_G]):
+                        curve[j, S_G] = 1e300
+                    stopped[j] = True
         # Where to insert; a cell is undecided where that is not enough.
         for j in range(n):
-            region[j] = COLD if frozen[j] else _region(bounds, p, rows, j, asked)
-            residual[j] = rows[j, S_Y] - look_up(values, rows[j, S_L], BASE)
+            region[j] = COLD if stopped[j] else _find_region_or_limit(bounds, p, curve, j, limits)
+            residual[j] = curve[j, S_Y] - interpolate_table(values, curve[j, S_L], BASE)
         for j in range(n - 1):
-            length[j] = max(_distance(rows, j, per_flux), 1e-14)
+            length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
         extra = 0
         for j in range(n):
-            wanted[j] = 0
-            if j + 1 == n or not open_[j] or (region[j] != FREE and region[j] == region[j + 1]):
+            n_inserted[j] = 0
+            if j + 1 == n or not connected[j] or (region[j] != FREE and region[j] == region[j + 1]):
                 continue
             cells += 1
             limited = False
             if length[j] > delta:
-                wanted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-                limited = length[j] > 2.0 * delta * (wanted[j] + 1)
+                n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
+                limited = length[j] > 2.0 * delta * (n_inserted[j] + 1)
             elif not in_series[j]:
-                doubtful = _hides_zeros(values, rows, residual, j, n, open_, length)
-                wanted[j] = 1 if doubtful and length[j] > finest else 0
+                doubtful = _hides_zeros(values, curve, residual, j, n, connected, length)
+                n_inserted[j] = 1 if doubtful and length[j] > finest else 0
                 limited = doubtful and length[j] <= finest
             if limited:
-                undecided = _grown(undecided, n_undecided + 1)
+                undecided = _grow(undecided, n_undecided + 1)
                 undecided[n_undecided] = j + extra + total
                 n_undecided += 1
-            extra += wanted[j]
+            extra += n_inserted[j]
         if total + n + extra > most:
             status = FULL
-            first[row + 1 :] = total
+            first[step + 1 :] = total
             break
         m = n + extra
-        states = _grown(states, total + m)
-        came_from = _grown(came_from, total + m)
-        goes_on = _grown(goes_on, total + m)
+        states = _grow(states, total + m)
+        came_from = _grow(came_from, total + m)
+        goes_on = _grow(goes_on, total + m)
         for j in range(n):
-            moved[j] = j
+            shifted[j] = j
         if extra > 0:
-            inserted = _grown(inserted, extra)
+            inserted = _grow(inserted, extra)
             k = 0
             for j in range(n):
-                for c in range(wanted[j]):
-                    _interpolate(rows, j, n, open_, length, (c + 1.0) / (wanted[j] + 1.0), inserted, k)
+                for c in range(n_inserted[j]):
+                    _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
                     k += 1
-            if m > len(rows):
-                rows, theta, in_series, frozen = (
-                    _grown(rows, m),
-                    _grown(theta, m),
-                    _grown(in_series, m),
-                    _grown(frozen, m),
+            if m > len(curve):
+                curve, theta, in_series, stopped = (
+                    _grow(curve, m),
+                    _grow(theta, m),
+                    _grow(in_series, m),
+                    _grow(stopped, m),
                 )
-                open_, region, residual, length = (
-                    _grown(open_, m),
-                    _grown(region, m),
-                    _grown(residual, m),
-                    _grown(length, m),
+                connected, region, residual, length = (
+                    _grow(connected, m),
+                    _grow(region, m),
+                    _grow(residual, m),
+                    _grow(length, m),
                 )
-                above, moved, wanted = _grown(above, m), _grown(moved, m), _grown(wanted, m)
-            # From the end of the curve, so that nothing is overwritten before it has moved.
+                previous, shifted, n_inserted = _grow(previous, m), _grow(shifted, m), _grow(n_inserted, m)
+            # From the end of the curve, so that nothing is overwritten before it is shifted.
             at = m
             for j in range(n - 1, -1, -1):
-                for c in range(wanted[j] - 1, -1, -1):
+                for c in range(n_inserted[j] - 1, -1, -1):
                     at -= 1
                     k -= 1
-                    t = (c + 1.0) / (wanted[j] + 1.0)
+                    t = (c + 1.0) / (n_inserted[j] + 1.0)
                     for q in range(5):
-                        rows[at, q] = inserted[k, q]
-                    theta[at] = theta[j] + t * (theta[moved[j + 1]] - theta[j])
-                    in_series[at] = in_series[j] and in_series[moved[j + 1]]
-                    frozen[at] = False
-                    open_[at] = True
-                    region[at] = _region(bounds, p, inserted, k, asked)
-                    residual[at] = inserted[k, S_Y] - look_up(values, inserted[k, S_L], BASE)
-                    came_from[total + at] = above[j] + t * (above[j + 1] - above[j])
+                        curve[at, q] = inserted[k, q]
+                    theta[at] = theta[j] + t * (theta[shifted[j + 1]] - theta[j])
+                    in_series[at] = in_series[j] and in_series[shifted[j + 1]]
+                    stopped[at] = False
+                    connected[at] = True
+                    region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
+                    residual[at] = inserted[k, S_Y] - interpolate_table(values, inserted[k, S_L], BASE)
+                    came_from[total + at] = previous[j] + t * (previous[j + 1] - previous[j])
                 at -= 1
-                moved[j] = at
+                shifted[j] = at
                 for q in range(5):
-                    rows[at, q] = rows[j, q]
-                theta[at], in_series[at], frozen[at] = theta[j], in_series[j], frozen[j]
-                open_[at], region[at], residual[at] = open_[j], region[j], residual[j]
+                    curve[at, q] = curve[j, q]
+                theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
+                connected[at], region[at], residual[at] = connected[j], region[j], residual[j]
         for j in range(n):
-            came_from[total + moved[j]] = above[j]
+            came_from[total + shifted[j]] = previous[j]
         for j in range(m):
             for q in range(5):
-                states[total + j, q] = rows[j, q]
-            goes_on[total + j] = open_[j]
-        first[row] = total
+                states[total + j, q] = curve[j, q]
+            goes_on[total + j] = connected[j]
+        first[step] = total
         # Close the curve where both ends of an interval lie in one invariant region, and drop what is closed in.
         at = 0
         joined = False  # to the position before
         for j in range(m):
-            ahead = j + 1 < m and open_[j] and not (region[j] != FREE and region[j] == region[j + 1])
+            ahead = j + 1 < m and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
             if joined or ahead:
                 if at < j:
                     for q in range(5):
-                        rows[at, q] = rows[j, q]
-                    theta[at], in_series[at], frozen[at] = theta[j], in_series[j], frozen[j]
-                open_[at] = ahead
-                above[at] = total + j
+                        curve[at, q] = curve[j, q]
+                    theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
+                connected[at] = ahead
+                previous[at] = total + j
                 at += 1
             joined = ahead
         n = at
         total += m
-        first[row + 1] = total
+        first[step + 1] = total
         if n == 0:
-            first[row + 1 :] = total
+            first[step + 1 :] = total
             break
     return (
         states[:total],
@@ -491,30 +497,30 @@ def carry(
 
 
 @compiled
-def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any) -> tuple[Any, Any]:
+def find_zeros(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any) -> tuple[Any, Any]:
     """The zeros of B of the base in a column of ``table``: left or upper state, right or lower state, fraction
     between (Z, 3); and their neighbours along the zero set (Z, 2)."""
     widest = 1
-    for row in range(len(first) - 1):
-        widest = max(widest, first[row + 1] - first[row])
+    for step in range(len(first) - 1):
+        widest = max(widest, first[step + 1] - first[step])
     zeros = np.empty((256, 3))
     links = np.full((256, 2), -1, np.int64)
     n_zeros = 0
-    # Of this row, and of the row before: residual, and the zero between a state and the next.
-    residual, above_residual = np.empty(widest), np.empty(widest)
-    edge, above_edge = np.empty(widest, np.int64), np.empty(widest, np.int64)
-    side = np.empty(widest, np.int64)  # zero of a trajectory since the row before
-    above_begin = 0
+    # Of this depth step, and of the one before: residual, and the zero between a state and the next.
+    residual, previous_residual = np.empty(widest), np.empty(widest)
+    edge, previous_edge = np.empty(widest, np.int64), np.empty(widest, np.int64)
+    side = np.empty(widest, np.int64)  # zero of a trajectory since the step before
+    previous_begin = 0
     cell_nodes = np.empty(64, np.int64)
     cell_places = np.empty((64, 2))
-    for row in range(len(first) - 1):
-        begin, end = first[row], first[row + 1]
-        zeros = _grown(zeros, n_zeros + 2 * (end - begin))
+    for step in range(len(first) - 1):
+        begin, end = first[step], first[step + 1]
+        zeros = _grow(zeros, n_zeros + 2 * (end - begin))
         before = len(links)
-        links = _grown(links, n_zeros + 2 * (end - begin))
+        links = _grow(links, n_zeros + 2 * (end - begin))
         links[before:] = -1
         for j in range(end - begin):
-            residual[j] = states[begin + j, S_Y] - look_up(table, states[begin + j, S_L], base)
+            residual[j] = states[begin + j, S_Y] - interpolate_table(table, states[begin + j, S_L], base)
             edge[j] = side[j] = -1
         for j in range(end - begin - 1):
             if (residual[j] >= 0.0) != (residual[j + 1] >= 0.0) and goes_on[begin + j]:
@@ -523,27 +529,27 @@ def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, f
                 zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
                 edge[j] = n_zeros
                 n_zeros += 1
-        for j in range(end - begin if row > 0 else 0):
-            above = int(came_from[begin + j])
-            was = above_residual[above - above_begin]
-            if (was >= 0.0) != (residual[j] >= 0.0) and above == came_from[begin + j]:
-                zeros[n_zeros, 0] = above
+        for j in range(end - begin if step > 0 else 0):
+            previous = int(came_from[begin + j])
+            was = previous_residual[previous - previous_begin]
+            if (was >= 0.0) != (residual[j] >= 0.0) and previous == came_from[begin + j]:
+                zeros[n_zeros, 0] = previous
                 zeros[n_zeros, 1] = begin + j
                 zeros[n_zeros, 2] = was / (was - residual[j])
                 side[j] = n_zeros
                 n_zeros += 1
-        # Lines through the cells between the rows.
-        left = 0 if row > 0 else end
+        # Lines through the cells between the steps.
+        left = 0 if step > 0 else end
         while left < end - begin - 1:
             right = left + 1
             while right < end - begin and came_from[begin + right] != int(came_from[begin + right]):
                 right += 1
             if right < end - begin and goes_on[begin + left]:
                 count = 0
-                above = above_edge[int(came_from[begin + left]) - above_begin]
-                if above >= 0:
-                    cell_nodes[0] = above
-                    cell_places[0, 0] = zeros[above, 2]
+                previous = previous_edge[int(came_from[begin + left]) - previous_begin]
+                if previous >= 0:
+                    cell_nodes[0] = previous
+                    cell_places[0, 0] = zeros[previous, 2]
                     cell_places[0, 1] = 0.0
                     count = 1
                 if side[right] >= 0:
@@ -565,16 +571,16 @@ def zeros_of(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, f
                     cell_places[count, 1] = zeros[side[left], 2]
                     count += 1
                 if count > 1:
-                    _match(cell_nodes, cell_places, count, links)
+                    _pair_zeros(cell_nodes, cell_places, count, links)
             left = right
-        residual, above_residual = above_residual, residual
-        edge, above_edge = above_edge, edge
-        above_begin = begin
+        residual, previous_residual = previous_residual, residual
+        edge, previous_edge = previous_edge, edge
+        previous_begin = begin
     return zeros[:n_zeros], links[:n_zeros]
 
 
 @compiled
-def walk(links: Any) -> tuple[Any, Any]:
+def order_zeros(links: Any) -> tuple[Any, Any]:
     """The zeros in the order of the lines that they form: indices (Z,), and where each line begins (lines + 1,).
 
     A closed line ends with the zero before its first.
@@ -602,34 +608,34 @@ def walk(links: Any) -> tuple[Any, Any]:
 
 
 @compiled
-def trace_back(states: Any, came_from: Any, place: float, row: int) -> Any:
-    """L and y in all rows down to ``row`` of the trajectory that passes its curve at ``place``, between two states as a
-    rule, (row + 1, 2)."""
-    out = np.empty((row + 1, 2))
-    for r in range(row, -1, -1):
+def trace_back(states: Any, came_from: Any, place: float, step: int) -> Any:
+    """L and y, (step + 1, 2), at all depth steps down to ``step`` of the trajectory that passes its curve at ``place``,
+    which is mostly between two states."""
+    out = np.empty((step + 1, 2))
+    for s in range(step, -1, -1):
         one = int(place)
         t = place - one
         other = one + 1 if t > 0.0 else one
         for q in range(2):
-            out[r, q] = (1.0 - t) * states[one, q] + t * states[other, q]
+            out[s, q] = (1.0 - t) * states[one, q] + t * states[other, q]
         place = (1.0 - t) * came_from[one] + t * came_from[other]
     return out
 
 
 @compiled
-def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
+def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
     """Bounds of the least and the largest net loss, and of the largest 1 - p dL/dp, of each trajectory down to each
     state: lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a
     trajectory lies between its neighbours, and its extrema between theirs."""
     out = np.empty((len(states), 6))
-    for row in range(len(overburden)):
-        p = overburden[row] + p_s
-        for i in range(first[row], first[row + 1]):
-            net = look_up(values, states[i, S_L], NET)
-            turn = p * states[i, S_Y] * look_up(values, states[i, S_L], INVERSE) - values[0, BETA]
+    for step in range(len(overburden)):
+        p = overburden[step] + p_s
+        for i in range(first[step], first[step + 1]):
+            net = interpolate_table(values, states[i, S_L], NET)
+            turn = p * states[i, S_Y] * interpolate_table(values, states[i, S_L], INVERSE) - values[0, BETA]
             out[i, 0] = out[i, 1] = out[i, 3] = out[i, 4] = net
             out[i, 2] = out[i, 5] = turn
-            if row > 0:
+            if step > 0:
                 one = int(came_from[i])
                 other = one + 1 if came_from[i] > one else one
                 for low in (0, 3):
@@ -640,16 +646,18 @@ def extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: A
 
 
 @compiled
-def extremes_back(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, rows: Any) -> Any:
-    """The least and the largest net loss, and the largest 1 - p dL/dp, down to ``places`` (k,) in ``rows``, (k, 3)."""
+def find_extremes(
+    values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, steps: Any
+) -> Any:
+    """The least and the largest net loss, and the largest 1 - p dL/dp, down to ``places`` (k,) in ``steps``, (k, 3)."""
     out = np.empty((len(places), 3))
     for k in range(len(places)):
-        back = trace_back(states, came_from, places[k], rows[k])
+        back = trace_back(states, came_from, places[k], steps[k])
         out[k, 0], out[k, 1], out[k, 2] = np.inf, -np.inf, -np.inf
-        for row in range(rows[k] + 1):
-            net = look_up(values, back[row, 0], NET)
-            p = overburden[row] + p_s
-            turn = p * back[row, 1] * look_up(values, back[row, 0], INVERSE) - values[0, BETA]
+        for step in range(steps[k] + 1):
+            net = interpolate_table(values, back[step, 0], NET)
+            p = overburden[step] + p_s
+            turn = p * back[step, 1] * interpolate_table(values, back[step, 0], INVERSE) - values[0, BETA]
             out[k, 0] = min(out[k, 0], net)
             out[k, 1] = max(out[k, 1], net)
             out[k, 2] = max(out[k, 2], turn)

@@ -3,10 +3,10 @@
 # notation: P overburden, L = ln x, y heat flux over p sqrt(T), B the residual of the base condition.
 
 All flows of a chute in a range of surface temperatures and hold-ups are the zeros of one function B(T_surface, P). At
-each depth the states (L, y) of all trajectories form a curve, labelled by the surface temperature. It is carried down;
-where it stretches, trajectories are inserted at that depth, so that what is separated by less than rounding of the
-surface temperature is still told apart. A part of the curve is dropped only where it lies in a region that no
-trajectory leaves, and in which B has one sign (:func:`chuteflow.trajectories.kernel.region_of`).
+each depth the states (L, y) of all trajectories form a curve, labelled by the surface temperature. It is integrated
+downwards. Where it stretches, trajectories are inserted at that depth, so that flows whose surface temperatures differ
+by less than rounding are still resolved. A part of the curve is dropped only where it lies in a region that no
+trajectory leaves, and in which B has one sign (:func:`chuteflow.trajectories.kernel.find_region`).
 """
 
 from __future__ import annotations
@@ -37,13 +37,14 @@ class Refinement:
 
     Attributes:
         delta: largest distance of neighbours in the plane of ln x and heat flux (in units of its scale); a larger
-            one misses what winds more closely.
+            one misses flows that lie closer together.
         finest: smallest distance at which a neighbour is inserted where the residual of the base condition turns
             towards zero between two; a larger one misses pairs of flows beside a fold.
         per_decade: trajectories per decade of surface temperature at the surface.
         step: step in tau = ln P + P/p_1; larger ones are less accurate.
-        lengths: largest step in P over the shortest length of the equations.
-        most: states kept at most, 48 bytes each; beyond, the search ends at the depth that it has reached, and says so.
+        lengths: largest step in P, as a multiple of the shortest length scale of the equations.
+        most: largest number of states kept, 48 bytes each. Where more are needed, the search ends at the depth reached,
+            and says so.
     """
 
     delta: float = 0.2
@@ -54,7 +55,7 @@ class Refinement:
     most: int = 1_200_000
 
 
-#: The refinement of every search unless another is asked for.
+#: The refinement of every search by default.
 REFINEMENT = Refinement()
 #: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
 #: overburden.
@@ -83,15 +84,15 @@ class RoughBranch:
 class TrajectoryGrid:
     """The trajectories of one chute at depths ``overburden`` (R,), and the zeros of B on them.
 
-    ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, row after row in the order of the
-    curve; ``first`` (R + 1,) are the first of each row; ``came_from`` (N,) the place of the same trajectory in the
-    row before, between two states where it was inserted; ``goes_on`` (N,) tells whether the curve goes on to the next
-    state. ``values`` (entries, 7) are the functions of L by which they go, and ``scale`` the size of heat fluxes. They
-    serve every base between those for which parts were kept: :meth:`of_base` has the zeros of another. ``zeros`` (Z, 3)
-    are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2) are their neighbours
-    along the branches. Of the ``cells`` between neighbours that were looked at, ``undecided`` (U,) tells the first
-    states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in them, or they are
-    too long. ``complete`` tells whether the curve was carried to the last depth.
+    ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, one depth step after the other in the
+    order of the curve; ``first`` (R + 1,) are the first of each step; ``came_from`` (N,) the place of the same
+    trajectory in the step before, between two states where it was inserted; ``goes_on`` (N,) is whether the curve
+    goes on to the next state. ``values`` (entries, 7) are the functions of L in their equations, and ``scale`` the size
+    of heat fluxes. They hold for every base between those for which parts were kept: :meth:`of_base` has the zeros of
+    another. ``zeros`` (Z, 3) are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2)
+    are their neighbours along the branches. Of the ``cells`` between neighbours that were examined, ``undecided`` (U,)
+    are the first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in
+    them, or they are too long. ``complete`` is whether the curve was integrated to the last depth.
     """
 
     model: Model
@@ -111,18 +112,18 @@ class TrajectoryGrid:
 
     def of_base(self, problem: Model) -> TrajectoryGrid:
         """The same trajectories with the zeros of B for the base of ``problem``."""
-        zeros, links = kernel.zeros_of(base_table(problem), 0, self.states, self.came_from, self.goes_on, self.first)
+        zeros, links = kernel.find_zeros(base_table(problem), 0, self.states, self.came_from, self.goes_on, self.first)
         return replace(self, model=problem, zeros=zeros, links=links)
 
     @property
     def deepest(self) -> float:
-        """The overburden down to which the curve was carried."""
+        """The overburden down to which the curve was integrated."""
         if self.complete:
             return float(self.overburden[-1])
         return float(self.overburden[max(int(np.searchsorted(self.first, len(self.states), side="left")) - 1, 0)])
 
-    def rows_of(self, places: Index) -> Index:
-        """The rows that states are in."""
+    def steps_of(self, places: Index) -> Index:
+        """The depth steps that states belong to."""
         return np.searchsorted(self.first, places, side="right") - 1
 
     @cached_property
@@ -139,7 +140,7 @@ class TrajectoryGrid:
     def quantities(self, places: Index) -> Array:
         """ln Q, ln h, ln M, ln T_surface of flows that had their base at states, (..., 4)."""
         model, state = self.model, self.states[places]
-        over = self.overburden[self.rows_of(places)]
+        over = self.overburden[self.steps_of(places)]
         f, _ = model.closures(np.exp(state[..., S_L]))
         root_t = np.exp(0.5 * (np.log(over + model.surface_stress) + f[GAMMA] - state[..., S_L]))
         flux = model.slip(f) * root_t * over + state[..., S_G]
@@ -154,7 +155,7 @@ class TrajectoryGrid:
     def lines(self) -> tuple[tuple[Index, bool], ...]:
         """The zeros in order along each branch of flows, the longest first, and whether it is closed: then the last is
         the first."""
-        order, starts = kernel.walk(self.links)
+        order, starts = kernel.order_zeros(self.links)
         found = []
         for begin, end in pairwise(starts.tolist()):
             zeros = order[begin:end]
@@ -166,9 +167,9 @@ class TrajectoryGrid:
         """The rough flow at a zero, on elements."""
         model = self.model
         one, other, fraction = int(self.zeros[zero, 0]), int(self.zeros[zero, 1]), float(self.zeros[zero, 2])
-        rows = self.rows_of(np.array([one, other]))
-        place = one + fraction if rows[0] == rows[1] else float(other)
-        back = kernel.trace_back(self.states, self.came_from, place, int(rows[1]))
+        steps = self.steps_of(np.array([one, other]))
+        place = one + fraction if steps[0] == steps[1] else float(other)
+        back = kernel.trace_back(self.states, self.came_from, place, int(steps[1]))
         log_mass, log_t = self.macroscopic[zero, 2:]
         mass, temperature = float(np.exp(log_mass)), float(np.exp(log_t))
         over = self.overburden[: len(back)]
@@ -190,7 +191,7 @@ class TrajectoryGrid:
 
 
 @lru_cache(maxsize=4)
-def carry_down(
+def integrate_trajectories(
     model: Model,
     coldest: float,
     hottest: float,
@@ -199,19 +200,19 @@ def carry_down(
     largest_flux: float = np.inf,
 ) -> TrajectoryGrid:
     """The grid of trajectories of ``model`` from surface temperatures ``coldest`` to ``hottest`` down to the hold-up
-    ``deepest``; of flows with a flux above ``largest_flux`` it need not show all. Those of the last few chutes are
-    remembered: one asks for other flows of the same chute next."""
-    start = starts(coldest, hottest, refinement)
-    return carry_down_for(model, np.empty((ENTRIES, 0)), start, deepest, refinement, largest_flux)
+    ``deepest``; it may miss flows with a flux above ``largest_flux``. The grids of the last few chutes are
+    cached, since other flows of the same chute are often wanted next."""
+    start = starting_temperatures(coldest, hottest, refinement)
+    return integrate_trajectories_from(model, np.empty((ENTRIES, 0)), start, deepest, refinement, largest_flux)
 
 
-def starts(coldest: float, hottest: float, refinement: Refinement = REFINEMENT) -> Array:
+def starting_temperatures(coldest: float, hottest: float, refinement: Refinement = REFINEMENT) -> Array:
     """The surface temperatures that trajectories start with, ascending."""
     decades = np.log10(hottest / coldest)
     return np.geomspace(coldest, hottest, max(3, int(np.ceil(refinement.per_decade * decades)) + 1))
 
 
-def carry_down_for(
+def integrate_trajectories_from(
     model: Model,
     others: Array,
     temperature: Array,
@@ -230,12 +231,12 @@ def carry_down_for(
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
     coldest = float(temperature[0]) ** (1.0 / (1.0 + model.beta))
     overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
-    states, came_from, goes_on, first, undecided, cells, status = kernel.carry(
+    states, came_from, goes_on, first, undecided, cells, status = kernel.integrate(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
         refinement.delta, 1.0 / scale, refinement.finest, refinement.most, largest_flux,
     )  # fmt: skip
-    zeros, links = kernel.zeros_of(t.values, BASE, states, came_from, goes_on, first)
+    zeros, links = kernel.find_zeros(t.values, BASE, states, came_from, goes_on, first)
     return TrajectoryGrid(
         model, refinement, overburden, states, came_from, goes_on, first, t.values, scale, zeros, links, cells,
         undecided, status == kernel.DONE,

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from chuteflow.numerics.tabulate import Array, Table
+from chuteflow.numerics.tabulate import Array, FunctionTable
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model, evaluate_closures
 
 #: The table runs over LOW <= ln x <= LOW + (ENTRIES - 1)/PER_UNIT; outside, the functions are constant.
@@ -45,7 +45,7 @@ class Tables:
 
 
 @lru_cache(maxsize=4)
-def _closures(table: Table) -> Array:
+def _closures(table: FunctionTable) -> Array:
     """The closures (8, entries) of all chutes with the same grains."""
     f, _ = evaluate_closures(table, np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
     return f

@@ -28,7 +28,7 @@ _EPILOG = (
 )
 
 
-class Plane(click.ParamType):
+class PlaneType(click.ParamType):
     """The second parameter and the number on the vertical axis."""
 
     name = "parameter,quantity"
@@ -52,7 +52,7 @@ class Plane(click.ParamType):
     metavar="KIND",
     help="What to follow: fold-Q (the default), fold-M, fold-T, density-inversion or interior-change.",
 )
-@options.option("--in", "plane", type=Plane(), help="Second parameter and vertical axis; slope,Q by default.")
+@options.option("--in", "plane", type=PlaneType(), help="Second parameter and vertical axis; slope,Q by default.")
 @options.range_options("where it is the second parameter")
 @options.option("--samples", type=click.INT, help="Values of the second parameter to start from; 13 by default.")
 @options.search_options
@@ -73,7 +73,7 @@ def command(**given: Any) -> None:
             chute,
             second=BY_KEY[second].name,
             bounds=bounds,
-            progress=lambda what, share: progress.tell(f"{what}, {share:.0%} of the range"),
+            progress=lambda what, fraction: progress.show(f"{what}, {fraction:.0%} of the range"),
             **chosen,
             **search,
         )
@@ -133,7 +133,7 @@ def _report(found: BoundarySet, second: str, scales: Scales | None) -> Iterator[
         yield _points(boundary, second, scales)
     yield ""
     if found.reason:
-        yield f"no boundary: {found.reason}" + (", as far as was looked" if found.incomplete else "")
+        yield f"no boundary: {found.reason}" + (", within the range searched" if found.incomplete else "")
     else:
         largest = max(float(boundary.error.max()) for boundary in found)
         yield f"error: estimated relative error of Q, h, M and {second}, at most {largest:.0e}"
@@ -145,7 +145,7 @@ def _report(found: BoundarySet, second: str, scales: Scales | None) -> Iterator[
     if found.incomplete:
         yield f"there may be more: {found.incomplete}"
     if found.skipped:
-        yield f"not entered, since families could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
+        yield f"not entered, since branches could not be followed there: {', '.join(f'{v:g}' for v in found.skipped)}"
 
 
 def _points(boundary: Boundary, second: str, scales: Scales | None) -> str:

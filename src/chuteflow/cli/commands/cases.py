@@ -11,11 +11,11 @@ from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from chuteflow.steady.cases import Case, Known
+    from chuteflow.steady.cases import Case, CaseNumber
 
 _EPILOG = (
-    "A case stands where a chute is asked for: chuteflow solve --case paper-dissipative --flux 3. Materials say no "
-    "slope: give --slope or --angle too. Numbers that are guessed are to be replaced by your own. A file for --chute "
+    "A case replaces the parameters of a chute: chuteflow solve --case paper-dissipative --flux 3. Materials have "
+    "no slope: give --slope or --angle too. Replace guessed numbers by your own. A file for --chute "
     "is TOML with the same keys: slope (or angle), e, ew, roughness, surface, closure, base, and for SI units "
     'diameter, density and gravity; case = "NAME" starts from a case.\n\n'
     "Example: chuteflow cases glass-beads"
@@ -47,7 +47,7 @@ def _object(one: Case) -> dict[str, Any]:
     }
 
 
-def _known(known: Known) -> dict[str, Any]:
+def _known(known: CaseNumber) -> dict[str, Any]:
     return {
         "value": known.value,
         "uncertainty": known.uncertainty,
@@ -67,16 +67,16 @@ def _list(chosen: list[Case]) -> Iterator[str]:
         rows.append([one.name, *(_cell(numbers[key]) if key in numbers else "-" for key in keys), one.description])
     yield tables.table(rows, words=(0, len(keys) + 1))
     yield ""
-    yield "? guessed; chuteflow cases NAME tells how each number is known and how well"
+    yield "? guessed; chuteflow cases NAME shows how each number is known and how well"
 
 
-def _cell(known: Known) -> str:
+def _cell(known: CaseNumber) -> str:
     from chuteflow.steady.cases import GUESSED
 
     return f"{known.value:g}{'?' if known.how == GUESSED else ''}"
 
 
-def _spread(known: Known) -> str:
+def _spread(known: CaseNumber) -> str:
     return "" if known.uncertainty is None else f"+- {known.uncertainty:g}"
 
 

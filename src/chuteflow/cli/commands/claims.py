@@ -17,7 +17,7 @@ from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
-    from chuteflow.paper.claims import Verdict
+    from chuteflow.paper.claims import ClaimResult
 
 _EPILOG = (
     'Verdicts: "confirmed" as printed; "corrected" where something else holds, which is computed and backed by an '
@@ -25,7 +25,7 @@ _EPILOG = (
 )
 #: Endings of the files that --out writes.
 _WRITTEN = (".json", ".txt")
-#: Shares of the width of the columns claim, printed and computed; the verdict takes what it needs.
+#: Fractions of the width of the columns claim, printed and computed; the verdict takes what it needs.
 _SHARES = (0.5, 0.2, 0.3)
 _VERDICT_WIDTH, _GAP, _NARROWEST, _WIDEST = 13, 2, 72, 140
 
@@ -75,17 +75,17 @@ def _chosen(only: str | None, section: str | None) -> list[str]:
     return [id for id in ids if wanted.intersection(CLAIMS[id].sections)]
 
 
-def _watched(verdicts: Iterable[Verdict], total: int) -> Iterator[Verdict]:
+def _watched(verdicts: Iterable[ClaimResult], total: int) -> Iterator[ClaimResult]:
     """The same, with the progress on standard error if that is a terminal."""
     with Progress() as progress:
         for number, verdict in enumerate(verdicts, 1):
             progress.clear()
             yield verdict
             if number < total:
-                progress.tell(f"{number} of {total} claims")
+                progress.show(f"{number} of {total} claims")
 
 
-def _json(verdicts: Sequence[Verdict]) -> str:
+def _json(verdicts: Sequence[ClaimResult]) -> str:
     from chuteflow.io import contract
 
     return contract.text([{field.name: _plain(getattr(v, field.name)) for field in fields(v)} for v in verdicts])
@@ -126,11 +126,11 @@ def _width() -> int:
     return min(max(shutil.get_terminal_size((100, 24)).columns, _NARROWEST), _WIDEST)
 
 
-def _report(verdicts: Iterable[Verdict], width: int) -> Iterator[str]:
+def _report(verdicts: Iterable[ClaimResult], width: int) -> Iterator[str]:
     from chuteflow.paper.claims import VERDICTS, shown
 
     free = width - _VERDICT_WIDTH - 3 * _GAP
-    widths = [_VERDICT_WIDTH, *(int(share * free) for share in _SHARES)]
+    widths = [_VERDICT_WIDTH, *(int(fraction * free) for fraction in _SHARES)]
     yield from _row(["verdict", "claim", "printed", "computed"], widths)
     yield from _row(["-" * width for width in widths], widths)
     numbers: dict[str, int] = dict.fromkeys(VERDICTS, 0)

@@ -31,7 +31,7 @@ _DENSITIES = (0.01, 0.1, 0.2, 0.3, 0.4, 0.49, 0.55, 0.6)
 @click.argument("name", required=False)
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="A parameter of the closure.")
 @options.option("--e", type=options.Number(), help="Restitution at which its functions are shown; 0.8 by default.")
-@options.option("--slope", type=options.Number(), help="Slope tan(theta) for laws that know it; 0.3 by default.")
+@options.option("--slope", type=options.Number(), help="Slope tan(theta) for laws that depend on it; 0.3 by default.")
 @options.output_options(_SAVED, "g0 to g6 beside Lun's")
 def command(name: str | None, **given: Any) -> None:
     """List the laws, or print and draw one."""

@@ -52,9 +52,9 @@ _SAVED = (".json", ".csv")
     multiple=True,
     help="A closure to compare with, as in compare-closures; all of the list by default.",
 )
-@options.option("--roughness", type=options.Number(), help="Roughness r, in place of what the run says.")
+@options.option("--roughness", type=options.Number(), help="Roughness r, instead of that of the run.")
 @options.option(
-    "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not say it."
+    "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not give it."
 )
 @options.option("--fit", metavar="NAMES", help="Find these parameters from the profiles too, such as e,ew,roughness.")
 @options.output_options(_SAVED, "profiles and functions")
@@ -139,7 +139,7 @@ def _with_parameters(measured: Measured, roughness: float | None, ew: float | No
 def _content(found: Comparison) -> dict[str, Any]:
     from chuteflow.io.contract import finite, flow_object
 
-    def told(rows: Sequence[Difference]) -> list[dict[str, Any]]:
+    def formatted(rows: Sequence[Difference]) -> list[dict[str, Any]]:
         return [
             {
                 "quantity": one.name,
@@ -170,11 +170,11 @@ def _content(found: Comparison) -> dict[str, Any]:
                 "mapping": one.mapping,
                 "condition": one.condition,
                 "flow": flow_object(one.flow),
-                "differences": told(one.differences),
+                "differences": formatted(one.differences),
             }
             for one in found.candidates
         ],
-        "functions": [{"closure": one.closure, "differences": told(one.differences)} for one in found.functions],
+        "functions": [{"closure": one.closure, "differences": formatted(one.differences)} for one in found.functions],
         "reasons": [
             dict(zip(("closure", "mapping", "condition", "reason"), row, strict=True)) for row in found.reasons
         ],
@@ -196,7 +196,7 @@ def _report(found: Comparison) -> Iterator[str]:
     yield f"the run is {_steadiness(measured)}"
     yield ""
     yield (
-        "flows of the theory: measured less theory in %, and in standard errors (of those with the same flux, the one "
+        "flows of the theory: measured minus theory in %, and in standard errors (of those with the same flux, the one "
         "with the nearest hold-up)"
     )
     header = ["closure", "r by", "same", "Q theory", *(_SYMBOLS[name] for name in _COLUMNS)]
@@ -215,7 +215,7 @@ def _report(found: Comparison) -> Iterator[str]:
         yield f"{closure}, r by {mapping}, same {condition}: no flow: {reason}"
     yield ""
     yield (
-        "functions at the measured state, p/M from 0.1 to 0.8, and the base: measured less law in %, and in standard "
+        "functions at the measured state, p/M from 0.1 to 0.8, and the base: measured minus law in %, and in standard "
         "errors"
     )
     names = list(dict.fromkeys(d.name for one in found.functions for d in one.differences))
@@ -247,12 +247,12 @@ def _number(measured: Measured, name: str) -> str:
 def _steadiness(measured: Measured) -> str:
     if not measured.drifts:
         return "not known to be steady: it has no time series"
-    told = ", ".join(
+    formatted = ", ".join(
         f"{name.replace('_', ' ')} {100.0 * one.value:+.2f} ± {100.0 * one.error:.2f} %"
         for name, one in measured.drifts.items()
     )
     words = {"steady": "steady", "not steady": "not steady", "undecided": "not shown to be steady"}
-    return f"{words[measured.steadiness]}; drift over 300 time units: {told}"
+    return f"{words[measured.steadiness]}; drift over 300 time units: {formatted}"
 
 
 def _cell(rows: Sequence[Difference], name: str) -> str:

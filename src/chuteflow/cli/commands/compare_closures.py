@@ -1,4 +1,4 @@
-"""``chuteflow compare-closures``: the flows of one chute under several constitutive laws, side by side."""
+"""``chuteflow compare-closures``: the flows of one chute under several constitutive laws, compared."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _COLUMNS = ("centre_of_mass", "mass_holdup", "surface_temperature", "base_volume
     "closures",
     metavar="NAME",
     multiple=True,
-    help="A closure to compare, with parameters as in extended:packing=0.64; give it several times, or names without "
-    "parameters with commas between. All of the list by default.",
+    help="A closure to compare, with parameters as in extended:packing=0.64; repeat the option, or separate names "
+    "without parameters by commas. All of the list by default.",
 )
 @options.condition_options
 @options.search_options

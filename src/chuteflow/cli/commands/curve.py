@@ -1,4 +1,4 @@
-"""``chuteflow curve``: every family of flows of a chute, with its special points."""
+"""``chuteflow curve``: every branch of flows of a chute, with its special points."""
 
 from __future__ import annotations
 
@@ -25,8 +25,10 @@ _EPILOG = "Example: chuteflow curve --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6
 @click.command("curve", help=COMMANDS["curve"], epilog=_EPILOG)
 @options.chute_options
 @options.option("--points", type=click.INT, help="Flows on the longest branch; 200 by default.")
-@click.option("--stability", is_flag=True, help="Judge flows along each family, and mark where stability changes.")
-@options.option("--samples", type=click.INT, help="Flows judged on each family with --stability; 24 by default.")
+@click.option(
+    "--stability", is_flag=True, help="Compute the stability of flows along each branch; mark where it changes."
+)
+@options.option("--samples", type=click.INT, help="Flows on each branch to examine with --stability; 24 by default.")
 @options.search_options
 @options.output_options()
 def command(**given: Any) -> None:
@@ -35,28 +37,28 @@ def command(**given: Any) -> None:
     scales = options.scales(given)
     options.require_outputs(given)
     if given["samples"] is not None and not given["stability"]:
-        raise InputError("--samples counts the flows judged with --stability: give both")
+        raise InputError("--samples is the number of flows for --stability: give both")
     from chuteflow.branches.curve import curve
 
     points = {} if given["points"] is None else {"points": given["points"]}
     found = curve(chute, **points, **options.search(given, chute.slope, scales))
     near, lines = ({}, []) if found.branches else options.nearest(given, chute, {}, scales)
-    judged = _judged(found, given["samples"]) if given["stability"] else None
-    if judged is not None:
-        found = judged.curve
+    stability = _mark_stability(found, given["samples"]) if given["stability"] else None
+    if stability is not None:
+        found = stability.curve
     if given["as_json"]:
         from chuteflow.io import contract
 
         content = contract.curve_object(found, scales) | near
-        if judged is not None:
+        if stability is not None:
             from chuteflow.io.stability_curve import changes_objects, samples_objects
 
-            objects = samples_objects(judged, scales), changes_objects(judged, scales)
+            objects = samples_objects(stability, scales), changes_objects(stability, scales)
             for branch, samples, changes in zip(content["branches"], *objects, strict=True):
                 branch["stability"], branch["stability_changes"] = samples, changes
         answer = contract.text(content)
     else:
-        answer = "\n".join(_report(found, judged, lines, scales))
+        answer = "\n".join(_report(found, stability, lines, scales))
 
     def save(path: str) -> None:
         from chuteflow.io import files
@@ -67,20 +69,22 @@ def command(**given: Any) -> None:
         from chuteflow.plotting.plots import plot_curve
         from chuteflow.plotting.stability_curve import plot_marked
 
-        return plot_curve(found, scales=scales) if judged is None else plot_marked(judged, scales=scales)
+        return plot_curve(found, scales=scales) if stability is None else plot_marked(stability, scales=scales)
 
     options.deliver(given, answer, save, plotted)
 
 
-def _judged(found: Curve, samples: int | None) -> MarkedCurve:
-    from chuteflow.stability.along import marked
+def _mark_stability(found: Curve, samples: int | None) -> MarkedCurve:
+    from chuteflow.stability.along import mark_stability
 
     chosen = {} if samples is None else {"samples": samples}
     with Progress() as progress:
-        return marked(found, progress=lambda share: progress.tell(f"{share:.0%} of the flows judged"), **chosen)
+        return mark_stability(
+            found, progress=lambda fraction: progress.show(f"{fraction:.0%} of the flows examined"), **chosen
+        )
 
 
-def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
+def _report(found: Curve, stability: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
 
     yield words.chute(found.chute)
@@ -88,11 +92,11 @@ def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scale
         yield words.scales(scales)
     for i, branch in enumerate(found.branches, 1):
         yield ""
-        yield f"family {i} of {len(found.branches)}, {len(branch.flows)} flows"
+        yield f"branch {i} of {len(found.branches)}, {len(branch.flows)} flows"
         yield _points(branch, found, scales)
         yield from words.validity(branch.flows, found.chute, scales)
-        if judged is not None:
-            yield _stretches(judged.branches[i - 1], found, scales)
+        if stability is not None:
+            yield _stretches(stability.branches[i - 1], found, scales)
     yield ""
     if found.branches:
         yield words.multiplicity(found, scales)
@@ -105,7 +109,7 @@ def _report(found: Curve, judged: MarkedCurve | None, near: Sequence[str], scale
 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
-    """Stable and unstable stretches of a family in words."""
+    """Stable and unstable stretches of a branch in words."""
     from chuteflow.io.stability_curve import change_words, stretch
 
     said = [stretch(run, found.chute, scales) for run in branch.runs]

@@ -28,7 +28,7 @@ _EPILOG = (
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
 _SELDOM, _OFTEN = 20.0, 0.5
-#: Share of the grains above the highest layer that is told.
+#: Fraction of the grains above the highest layer that is told.
 _ABOVE = 0.005
 _TOLD = ("mass_flux", "mass_holdup", "centre_of_mass", "mean_temperature", "slip_velocity", "heat_from_base")
 
@@ -74,12 +74,12 @@ def command() -> None:
 @options.option("--stiffness", type=options.Number(), help="Stiffness of contacts, in place of that of the bounds.")
 @options.option("--processes", type=click.INT, help="MPI processes of LAMMPS; 1 by default.")
 @options.option(
-    "--out", metavar="FOLDER", help="Folder of the run, made or gone on with; averages go to FOLDER/run.nc."
+    "--out", metavar="FOLDER", help="Folder of the run, created or continued; averages go to FOLDER/run.nc."
 )
 @options.quiet_option
 @click.option("--write-only", is_flag=True, help="Write the input of LAMMPS into the folder, to run it elsewhere.")
 def run_command(**given: Any) -> None:
-    """Simulate a chute; what was interrupted or killed goes on with the same command."""
+    """Simulate a chute; what was interrupted or killed continues with the same command."""
     from chuteflow.dem.engine import engine, require_processes
     from chuteflow.dem.run import prepare
 
@@ -121,7 +121,7 @@ def read_command(source: str, **given: Any) -> None:
 
 
 @command.command("study")
-@options.option("--out", metavar="FOLDER", help="Folder of the study, made or gone on with.")
+@options.option("--out", metavar="FOLDER", help="Folder of the study, created or continued.")
 @options.option("--data", metavar="FOLDER", help="Folder of the averages, one CSV for each run; OUT/data by default.")
 @options.option("--processes", type=click.INT, help="MPI processes of LAMMPS; 1 by default.")
 @options.quiet_option
@@ -204,7 +204,7 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
         found = []
         for one in read_folder(folder, names):
             found.append(one)
-            progress.tell(f"{len(found)} flows compared")
+            progress.show(f"{len(found)} flows compared")
     text = tables.table(table(found, names), words=(0, 5))
     options.deliver(given, text, None, lambda: plot_results(found))
 
@@ -245,17 +245,17 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
 def _carry_out(run: Run, processes: int) -> None:
     from chuteflow.dem.run import go_on
 
-    watch = _Watch(run)
+    watch = _SimulationProgress(run)
     try:
         for moment in go_on(run, processes):
-            watch.tell(moment)
+            watch.show(moment)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"stopped; to go on: chuteflow {shlex.join(sys.argv[1:])}") from None
     finally:
         watch.end()
 
 
-class _Watch:
+class _SimulationProgress:
     """Lines on standard error: what is simulated and how long the rest will take."""
 
     def __init__(self, run: Run) -> None:
@@ -263,7 +263,7 @@ class _Watch:
         self._begin = self._told = time.monotonic()
         self._first: int | None = None
 
-    def tell(self, moment: Moment) -> None:
+    def show(self, moment: Moment) -> None:
         """Tell how far it is, now and then."""
         now = time.monotonic()
         if self._first is None:
@@ -277,7 +277,7 @@ class _Watch:
             f"t = {moment.time:.0f}, step {moment.step} of {moment.last}: {pace:.0f} steps a second, {left:.0f} s left"
         )
         if self._line.is_shown:
-            self._line.tell(text)
+            self._line.show(text)
         else:
             options.note(text)
 
@@ -331,10 +331,10 @@ def _warnings(run: Run, measured: Measured) -> Iterator[str]:
     bounds, scene = run.scene.bounds, run.scene
     if not run.is_complete:
         yield f"the run has come to step {run.done} of {run.steps.last}"
-    share = measured.numbers["contact_share"]
-    if scene.stiffness is None and share > bounds.contact_share:
+    fraction = measured.numbers["contact_share"]
+    if scene.stiffness is None and fraction > bounds.contact_share:
         yield (
-            f"a grain has {share:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
+            f"a grain has {fraction:.3g} contacts at a time on average, above the bound {bounds.contact_share:g} on "
             "contact times: grains rest on one another, or contacts are too soft"
         )
     above = measured.numbers["share_above"]

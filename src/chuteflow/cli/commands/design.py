@@ -9,7 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.fit import Range, chute_with
+from chuteflow.cli.commands.fit import NamedRangeType, chute_with
 from chuteflow.errors import InputError
 from chuteflow.parameters import CONDITIONS
 
@@ -24,11 +24,11 @@ _COLUMNS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature",
 
 
 @click.command("design", help=COMMANDS["design"], epilog=_EPILOG)
-@options.option("--unknown", metavar="NAMES", help="Parameters to be found, with commas between, such as slope,e.")
+@options.option("--unknown", metavar="NAMES", help="Parameters to be found, separated by commas, such as slope,e.")
 @options.chute_options
 @options.condition_options
 @click.option("--want", metavar="NAME=VALUE", multiple=True, help="Another number of the flow, such as depth=10.")
-@click.option("--range", "ranges", type=Range(), multiple=True, help="Where an unknown parameter is tried.")
+@click.option("--range", "ranges", type=NamedRangeType(), multiple=True, help="Where an unknown parameter is tried.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @options.quiet_option
 def command(**given: Any) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.quantities import Scales
 
-#: Processes at most, unless another number is asked for.
+#: Processes at most, by default.
 _MOST_PROCESSES = 8
 _EPILOG = (
     "Example: chuteflow domain --slope 0.1:0.5 --roughness 0.5:0.866 --e 0.8 --ew 0.8 --temperature 1,10,100"
@@ -29,41 +29,29 @@ _EPILOG = (
 )
 
 
-class Size(click.ParamType):
-    """Cells as NXxNY."""
-
-    name = "nxxny"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """Both numbers."""
-        try:
-            x, y = map(int, str(value).lower().split("x"))
-        except ValueError:
-            self.fail(f"{value!r}: write two whole numbers with an x between, for example 400x400", param, ctx)
-        return x, y
-
-
-class Numbers(click.ParamType):
-    """Numbers with commas between."""
+class NumbersInUnits(click.ParamType):
+    """Numbers separated by commas; with a unit after them as typed."""
 
     name = "numbers"
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...] | options.Amounts:
+    ) -> tuple[float, ...] | options.NumbersWithUnit:
         """The numbers."""
         numbers, unit = options.without_unit(str(value))
         texts = numbers.split(",")
         found = tuple(options.Number().convert(one, param, ctx) for one in texts)
-        return options.Amounts(tuple(texts), unit, ",") if unit else found
+        return options.NumbersWithUnit(tuple(texts), unit, ",") if unit else found
 
 
 @click.command("domain", help=COMMANDS["domain"], epilog=_EPILOG)
 @options.range_options("puts it on an axis")
-@options.option("--size", type=Size(), help="Cells along x and y; 400x400 by default.")
-@options.option("--temperature", type=Numbers(), help="Surface temperatures at which to look for flows, as 1,10,100.")
+@options.option("--size", type=options.Size("NXxNY", "400x400"), help="Cells along x and y; 400x400 by default.")
 @options.option(
-    "--tolerance", type=options.Number(), help="Share of an axis to locate boundaries to; 0.002 by default."
+    "--temperature", type=NumbersInUnits(), help="Surface temperatures at which to look for flows, as 1,10,100."
+)
+@options.option(
+    "--tolerance", type=options.Number(), help="Fraction of an axis to locate boundaries to; 0.002 by default."
 )
 @options.search_range_options
 @options.option("--processes", type=click.INT, help="Processes to compute in; by default one for each core, up to 8.")
@@ -89,7 +77,7 @@ def command(**given: Any) -> None:
             x,
             y,
             workers=workers,
-            progress=lambda done, known: progress.tell(f"{done} of {known} columns, as far as is known"),
+            progress=lambda done, known: progress.show(f"{done} of {known} columns, as far as is known"),
             **chosen,
             **search,
         )
@@ -151,11 +139,11 @@ def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
     ]
     yield f"chute: {', '.join(others)}, surface {plane.chute.surface}, {plane.chute.laws}"
     yield ""
-    rows = [["", "value", "share of the plane"]]
+    rows = [["", "value", "fraction of the plane"]]
     parts = shares(found)
     for name, (_, values) in CLASSES.items():
-        for value, share in parts[name].items():
-            rows.append([name, _named(int(value), values, name in BITS), f"{share:.2%}"])
+        for value, fraction in parts[name].items():
+            rows.append([name, _named(int(value), values, name in BITS), f"{fraction:.2%}"])
     of = None if "slope" in (x.name, y.name) else scales
     for temperature, part in zip(plane.temperatures, parts["exists_at"], strict=True):
         at = words.amount("surface_temperature", temperature, plane.chute, of) if of else f"{temperature:g}"

@@ -14,7 +14,7 @@ from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, 
 from chuteflow.processes import available_cores
 
 
-class Numbers(click.ParamType):
+class FigureNumbers(click.ParamType):
     """Numbers of figures, separated by commas."""
 
     name = "numbers"
@@ -40,8 +40,8 @@ METHOD_HELP = "How flows are computed: overburden (this package's, the default) 
 
 
 @click.command("figures", help=COMMANDS["figures"], epilog=_EPILOG)
-@options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
-@options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
+@options.option("--only", type=FigureNumbers(), help="Numbers of the figures, such as 2,3; all by default.")
+@options.option("--out", metavar="DIR", help="Directory to write to, created if needed; here by default.")
 @options.option(
     "--format",
     "kind",
@@ -66,7 +66,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
     for number, path in names.items():
         begin = time.perf_counter()
         with Progress() as progress:
-            progress.tell(f"figure {number} ...")
+            progress.show(f"figure {number} ...")
             data = computed(number, flows)
             write_figure(drawn(number, data), path)
             write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.fitting.calibration import Fit
-    from chuteflow.fitting.comparison import Comparison
+    from chuteflow.fitting.comparison import LawComparison
     from chuteflow.steady.chute import Chute
 
 _EPILOG = (
@@ -32,7 +32,7 @@ _FIRST = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
 _BANDS = 4
 
 
-class Range(click.ParamType):
+class NamedRangeType(click.ParamType):
     """A name and two numbers as NAME=LO:HI."""
 
     name = "name=lo:hi"
@@ -44,19 +44,25 @@ class Range(click.ParamType):
         name, equals, text = str(value).partition("=")
         if not (equals and name.strip()):
             self.fail(f"{value!r} is not a range: write NAME=LO:HI, for example e=0.7:0.95", param, ctx)
-        ends: Any = options.Interval().convert(text, param, ctx)
+        ends: Any = options.IntervalType().convert(text, param, ctx)
         return name.strip(), ends
 
 
 @click.command("fit", help=COMMANDS["fit"], epilog=_EPILOG)
 @click.argument("data", metavar="DATA.csv")
-@options.option("--free", metavar="NAMES", help="Parameters to be found, with commas between, such as e,ew,roughness.")
+@options.option("--free", metavar="NAMES", help="Parameters to be found, separated by commas, such as e,ew,roughness.")
 @options.chute_options
 @click.option("--base-height", is_flag=True, help="The height of the base is unknown too.")
-@click.option("--range", "ranges", type=Range(), multiple=True, help="Where a free parameter is looked for first.")
-@click.option("--trust", type=Range(), multiple=True, help="Use values of z, nu, T or u in this range alone.")
+@click.option(
+    "--range",
+    "ranges",
+    type=NamedRangeType(),
+    multiple=True,
+    help="Range of a free parameter in which the search starts.",
+)
+@click.option("--trust", type=NamedRangeType(), multiple=True, help="Use only values of z, nu, T or u in this range.")
 @options.option("--loss", metavar="NAME", help="linear (the default), or soft_l1, huber, cauchy for outliers.")
-@options.option("--confidence", type=options.Number(), help="Of the intervals; 0.95 by default.")
+@options.option("--confidence", type=options.Number(), help="Confidence of the intervals; 0.95 by default.")
 @options.option("--trials", type=click.INT, help="Trial chutes that the search starts from; 64 for one experiment.")
 @options.output_options((), "measurements, fit and residuals")
 @options.option(
@@ -118,7 +124,7 @@ def _names(text: str | None) -> list[str]:
 
 
 def _closures(given: Mapping[str, Any]) -> list[str]:
-    """The closures that are compared: several with commas between, where none has parameters of its own."""
+    """The closures that are compared: several separated by commas, where none has parameters of its own."""
     text = given["closure"] or "lun"
     if given["settings"]:
         from chuteflow.theory.laws import settings_added
@@ -147,7 +153,7 @@ def _without_roughness(given: Mapping[str, Any]) -> bool:
     return str(given["base"] or "").startswith("johnson-jackson")
 
 
-def _report(found: Comparison) -> Iterator[str]:
+def _report(found: LawComparison) -> Iterator[str]:
     from chuteflow.io import tables, words
 
     best = found.fits[0]
@@ -210,7 +216,7 @@ def _goodness(best: Fit) -> Iterator[str]:
     else:
         from chuteflow.fitting.measurements import ASSUMED
 
-        said = f"errors were not given: the residuals say {100.0 * ASSUMED * best.error_scale:.2g} % of every value"
+        said = f"errors were not given: the residuals imply {100.0 * ASSUMED * best.error_scale:.2g} % of every value"
         yield f"{said}; AICc = {best.aicc:.4g}"
 
 

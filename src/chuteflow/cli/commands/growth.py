@@ -26,31 +26,17 @@ _EPILOG = (
 )
 
 
-class Size(click.ParamType):
-    """Two whole numbers as MxN."""
-
-    name = "mxn"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """Both numbers."""
-        try:
-            m, n = map(int, str(value).lower().split("x"))
-        except ValueError:
-            self.fail(f"{value!r} is not a size: write two whole numbers as MxN, for example 40x40", param, ctx)
-        return m, n
-
-
 @click.command("growth", help=COMMANDS["growth"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
 @options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
 @options.option(
     "--kx",
-    type=options.Interval(units=True),
+    type=options.IntervalType(units=True),
     help="Wavenumbers along the slope; by default to three times that of the maximum.",
 )
-@options.option("--ky", type=options.Interval(units=True), help="Wavenumbers across the slope.")
-@options.option("--size", type=Size(), help="Points along kx and ky; 40x40 by default.")
+@options.option("--ky", type=options.IntervalType(units=True), help="Wavenumbers across the slope.")
+@options.option("--size", type=options.Size("MxN", "40x40"), help="Points along kx and ky; 40x40 by default.")
 @options.output_options(SAVED)
 def command(**given: Any) -> None:
     """Solve, map, print, save and draw."""
@@ -75,7 +61,7 @@ def command(**given: Any) -> None:
             flow,
             kx=kx,
             ky=ky,
-            progress=lambda share: progress.tell(f"{share:.0%} of the map"),
+            progress=lambda fraction: progress.show(f"{fraction:.0%} of the map"),
             **size,
         )
 
@@ -90,12 +76,15 @@ def command(**given: Any) -> None:
 
 
 def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
-    """At how many points of a map no mode is told, and at how many it is not known whether something grows."""
+    """At how many points of a map no mode is resolved, and at how many it is not known whether something grows."""
     hidden = int((np.isnan(growth) & ~unresolved).sum())
     if hidden:
-        yield f"no mode is told from the continuous spectrum, which decays, at {hidden} points"
+        yield f"no mode is distinguished from the continuous spectrum, which decays, at {hidden} points"
     if unresolved.any():
-        yield f"not known at {int(unresolved.sum())} points: the finest grids do not tell whether something grows there"
+        yield (
+            f"not known at {int(unresolved.sum())} points: the finest grids do not resolve whether a disturbance grows"
+            " there"
+        )
 
 
 def _report(found: WaveMap, scales: Scales | None) -> Iterator[str]:

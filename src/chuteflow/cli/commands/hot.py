@@ -52,7 +52,7 @@ _SCALED = {
 #: Parameters of the model: their names in the JSON object and what they are.
 _PARAMETERS = {
     "lambda": "the one parameter of the reduced system, below 3 (4.14)",
-    "delta": "dissipation less production in the interior (4.9)",
+    "delta": "dissipation minus production in the interior (4.9)",
     "F21": "energy given by the base, less what it takes (4.3)",
     "alpha": "scale of nu T_inf (4.10)",
 }

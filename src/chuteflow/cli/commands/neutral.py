@@ -1,4 +1,4 @@
-"""``chuteflow neutral``: growth of waves in one direction along a family of flows, and the neutral curves."""
+"""``chuteflow neutral``: growth of waves in one direction along a branch of flows, and the neutral curves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.growth import SAVED, Size, hidden_and_unresolved
+from chuteflow.cli.commands.growth import SAVED, hidden_and_unresolved
 from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _ALONG = ("mass_flux", "centre_of_mass", "surface_temperature")
 _ANGLES = {"along": 0.0, "across": 90.0}
 _EPILOG = (
-    "k h is the wavenumber times the height of the centre of mass. The family is that of the hottest flows in the "
+    "k h is the wavenumber times the height of the centre of mass. The branch is that of the hottest flows in the "
     "range searched.\n\n"
     "Example: chuteflow neutral --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --waves across --size 16x16"
     " --plot neutral.png"
@@ -34,10 +34,10 @@ _EPILOG = (
 @click.command("neutral", help=COMMANDS["neutral"], epilog=_EPILOG)
 @options.chute_options
 @options.option("--waves", metavar="DIRECTION", help="along (the default), across, or an angle from 0 to 90 degrees.")
-@options.option("--kh", type=options.Interval(), help="Range of k h; 0.001:1 by default.")
-@options.option("--size", type=Size(), help="Points along k h and along the family; 24x24 by default.")
+@options.option("--kh", type=options.IntervalType(), help="Range of k h; 0.001:1 by default.")
+@options.option("--size", type=options.Size("MxN", "24x24"), help="Points along k h and the branch; 24x24 by default.")
 @options.option(
-    "--search-temperature", type=options.Interval(units=True), help="Surface temperatures; 0.05:50 by default."
+    "--search-temperature", type=options.IntervalType(units=True), help="Surface temperatures; 0.05:50 by default."
 )
 @options.option("--largest-holdup", type=options.NumberInUnits(), help="Largest mass hold-up searched; 30 by default.")
 @options.output_options(SAVED)
@@ -64,7 +64,7 @@ def command(**given: Any) -> None:
         mapped = family_map(
             traced.branches[0].flows,
             angle=angle,
-            progress=lambda share: progress.tell(f"{share:.0%} of the map"),
+            progress=lambda fraction: progress.show(f"{fraction:.0%} of the map"),
             **asked,
         )
 
@@ -96,7 +96,7 @@ def _report(found: FamilyMap, scales: Scales | None) -> Iterator[str]:
     if scales is not None:
         yield words.scales(scales)
     yield (
-        f"family: {_place(first, scales)} to {_place(last, scales)}; waves at {found.angle:g} degrees to the slope, "
+        f"branch: {_place(first, scales)} to {_place(last, scales)}; waves at {found.angle:g} degrees to the slope, "
         f"k h from {low} to {high}"
     )
     yield ""

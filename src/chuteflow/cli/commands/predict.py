@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chuteflow.fitting.prediction import Prediction
 
 _EPILOG = (
-    "What is given by an option is known; all else is as the fit says, with its uncertainty.\n\n"
+    "Parameters given by an option are taken as known; all others are those of the fit, with their uncertainty.\n\n"
     "Example: chuteflow predict fit.nc --slope 0.32 --flux 3 --plot prediction.png"
 )
 _COLUMNS = (
@@ -39,7 +39,7 @@ _COLUMNS = (
 @options.option("--ew", type=options.Number(), help="Another restitution of a grain and the base.")
 @options.option("--roughness", type=options.Number(), help="Another roughness of the base.")
 @options.condition_options
-@options.option("--confidence", type=options.Number(), help="Of the bands; 0.95 by default.")
+@options.option("--confidence", type=options.Number(), help="Confidence of the bands; 0.95 by default.")
 @options.output_options((".csv", ".json"), "curve and profiles with bands")
 def command(**given: Any) -> None:
     """Load, predict, print, save and draw."""

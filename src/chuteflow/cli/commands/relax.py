@@ -16,7 +16,7 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from chuteflow.stability.relaxation import Moment, Outcome
+    from chuteflow.stability.relaxation import Outcome, RelaxationState
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
 
@@ -33,8 +33,8 @@ _SAVED = (".csv", ".json")
 
 
 _EPILOG = (
-    "The flow stays the same all along the chute, and its hold-up M what it is: waves along and across the slope "
-    "are left out. The free surface alone is followed.\n\n"
+    "The flow stays uniform along the chute and keeps its hold-up M: waves along and across the slope are left "
+    "out. Only the free surface is supported.\n\n"
     "Example: chuteflow relax --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --heat 1.2"
 )
 
@@ -73,7 +73,7 @@ def command(**given: Any) -> None:
             temperature=given["heat"],
             velocity=given["push"],
             duration=duration,
-            progress=lambda time: progress.tell(f"t = {time:.6g} of {duration:.6g}"),
+            progress=lambda time: progress.show(f"t = {time:.6g} of {duration:.6g}"),
         )
     moments, end = followed.moments, followed.outcome
     content = _content(flow, moments, end, scales)
@@ -86,7 +86,7 @@ def command(**given: Any) -> None:
     )
 
 
-def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> dict[str, Any]:
+def _content(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> dict[str, Any]:
     from chuteflow.io.contract import chute_object, factor, flow_object, units_object
     from chuteflow.steady.quantities import NUMBERS
 
@@ -106,7 +106,7 @@ def _content(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales
     }
 
 
-def _told(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Iterator[str]:
+def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
     from chuteflow.io.contract import factor
     from chuteflow.io.tables import number, table
@@ -125,7 +125,7 @@ def _told(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | 
     yield _verdict(flow, moments[-1], end, scales)
 
 
-def _verdict(flow: Flow, last: Moment, end: Outcome, scales: Scales | None) -> str:
+def _verdict(flow: Flow, last: RelaxationState, end: Outcome, scales: Scales | None) -> str:
     from chuteflow.io.words import amount
 
     def said(name: str, value: float) -> str:
@@ -146,15 +146,15 @@ def _verdict(flow: Flow, last: Moment, end: Outcome, scales: Scales | None) -> s
     away = f"{100.0 * end.distance:.2g} % away"
     if end.distance < _SETTLED:
         return f"it has come to {name}: {away} at t = {ended}"
-    pace = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
+    rate = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
     if end.leading is not None:
-        pace += (
+        rate += (
             f" (the leading discrete mode of that flow has the rate {said('growth', end.leading)}; what is slower "
             "belongs to the continuous spectrum and depends on the grid)"
         )
     if end.distance < _ARRIVED and end.rate < 0.0:
-        return f"it comes to {name}: {away} at t = {ended}, and {pace}"
-    return f"not settled at t = {ended}: the nearest is {name}, {away}, and {pace}; give a longer --duration"
+        return f"it comes to {name}: {away} at t = {ended}, and {rate}"
+    return f"not settled at t = {ended}: the nearest is {name}, {away}, and {rate}; give a longer --duration"
 
 
 def _rows(content: dict[str, Any]) -> list[list[str]]:
@@ -162,7 +162,7 @@ def _rows(content: dict[str, Any]) -> list[list[str]]:
     return [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
 
 
-def _plotted(flow: Flow, moments: Sequence[Moment], end: Outcome, scales: Scales | None) -> Figure:
+def _plotted(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Figure:
     from chuteflow.plotting.relaxation_plot import plot_relaxation
 
     return plot_relaxation(flow, moments, end, scales=scales)

@@ -10,13 +10,13 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.figures import METHOD_HELP, Numbers
+from chuteflow.cli.commands.figures import METHOD_HELP, FigureNumbers
 from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
 from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
-    from chuteflow.paper.claims import Verdict
-    from chuteflow.paper.report import Shown
+    from chuteflow.paper.claims import ClaimResult
+    from chuteflow.paper.report import ShownFigure
     from chuteflow.paper.sources import Source
 
 _EPILOG = "Example: chuteflow report --out report, then open report/index.html in a browser."
@@ -24,9 +24,9 @@ _NAME = "index.html"
 
 
 @click.command("report", help=COMMANDS["report"], epilog=_EPILOG)
-@options.option("--out", metavar="DIR", help="Directory to write to, made if need be; here by default.")
+@options.option("--out", metavar="DIR", help="Directory to write to, created if needed; here by default.")
 @options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
-@options.option("--only", type=Numbers(), help="Numbers of the figures, such as 2,3; all by default.")
+@options.option("--only", type=FigureNumbers(), help="FigureNumbers of the figures, such as 2,3; all by default.")
 @click.option("--no-claims", is_flag=True, help="Leave out the claims.")
 @options.quiet_option
 def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool, quiet: bool) -> None:
@@ -52,14 +52,14 @@ def _tell(progress: str) -> None:
         click.echo(progress, err=True)
 
 
-def _drawn(number: int, flows: Source) -> Shown:
+def _drawn(number: int, flows: Source) -> ShownFigure:
     from chuteflow.paper.captions import CAPTIONS
     from chuteflow.paper.facts import facts
-    from chuteflow.paper.report import Shown, picture
+    from chuteflow.paper.report import ShownFigure, picture
 
     begin = time.perf_counter()
     data = computed(number, flows)
-    found = Shown(
+    found = ShownFigure(
         number=number,
         title=FIGURES[number],
         caption=CAPTIONS[number],
@@ -71,7 +71,7 @@ def _drawn(number: int, flows: Source) -> Shown:
     return found
 
 
-def _checked() -> list[Verdict]:
+def _checked() -> list[ClaimResult]:
     from chuteflow.paper.claims import CLAIMS, check
 
     found = []

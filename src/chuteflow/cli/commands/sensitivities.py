@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from chuteflow.steady.sensitivity import Sensitivity
 
 _EPILOG = (
-    "Derivatives are exact. By default the mass flux is kept while a parameter changes; at a fold of what is kept they "
-    "are infinite, and those along and across the branch, in the JSON object, are not.\n\n"
+    "Derivatives are exact. By default the mass flux is held fixed while a parameter changes. At a fold of the fixed "
+    "quantity derivatives are infinite; those along and across the branch, in the JSON object, are finite.\n\n"
     "Example: chuteflow sensitivities --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3 --flow 2"
 )
 #: Heights of profiles in the JSON object, up to the depth.
@@ -29,8 +29,8 @@ _HEIGHTS = 21
 @options.chute_options
 @options.condition_options
 @options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest; all by default.")
-@options.option("--fixed", metavar="NAME", help="What is kept: Q (the default), M, h or T_surface.")
-@options.option("--parameters", metavar="NAMES", help="Parameters, with commas between; all by default.")
+@options.option("--fixed", metavar="NAME", help="Quantity held fixed: Q (the default), M, h or T_surface.")
+@options.option("--parameters", metavar="NAMES", help="Parameters, separated by commas; all by default.")
 @options.output_options((".csv", ".json"), "them, ranked,")
 def command(**given: Any) -> None:
     """Solve, differentiate, print, save and draw."""

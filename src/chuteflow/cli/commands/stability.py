@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.branches.results import FlowSet
-    from chuteflow.stability.answers import Answer
-    from chuteflow.stability.budget import Budget
+    from chuteflow.stability.answers import StabilityAnswer
+    from chuteflow.stability.budget import ModeBudget
     from chuteflow.stability.modes import Mode
-    from chuteflow.stability.verdict import Stability
+    from chuteflow.stability.result import Stability
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 _EPILOG = (
     "A flow is stable if no discrete mode with a wavenumber from 1e-3/h to 10/h grows faster than 1e-6 "
     "sqrt(g cos(theta)/h). With --kx and --ky one wave is examined, which says nothing of the others. Rates are in "
-    "sqrt(g cos(theta)/d), wavenumbers in 1/d, speeds in sqrt(g d cos(theta)). Where stability cannot be posed or "
-    "told, that is said of the flow, and its numbers are null.\n\n"
+    "sqrt(g cos(theta)/d), wavenumbers in 1/d, speeds in sqrt(g d cos(theta)). Where stability is not defined or "
+    "not resolved, the output says so, and its numbers are null.\n\n"
     "Example: chuteflow stability --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3"
 )
 _SAVED = (".csv", ".json")
@@ -41,7 +41,7 @@ _HEADING = (
     ("mode", "kx", "ky", "growth", "speed", "error"),
     ("", "[1/m]", "[1/m]", "[1/s]", "[m/s]", "[1/s]"),
 )
-_VERDICTS = {True: "stable", False: "unstable", None: "?"}
+_STATES = {True: "stable", False: "unstable", None: "?"}
 
 
 @click.command("stability", help=COMMANDS["stability"], epilog=_EPILOG)
@@ -52,7 +52,7 @@ _VERDICTS = {True: "stable", False: "unstable", None: "?"}
     "--ky", type=options.NumberInUnits(), help="Wavenumber across the slope, in 1/d; searched if not given."
 )
 @options.option(
-    "--modes", "count", type=click.INT, help="Leading modes to tell, at the wavenumbers found; 1 by default."
+    "--modes", "count", type=click.INT, help="Leading modes to print, at the wavenumbers found; 1 by default."
 )
 @options.search_options
 @options.option("--budget", metavar="FILE", help="Draw the energy budgets of the modes into FILE: .png, .pdf or .svg.")
@@ -100,23 +100,23 @@ def command(as_json: bool, **given: Any) -> None:
     options.deliver(given, answer, partial(_save, found, answers, scales), plotted, budget=drawn)
 
 
-def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Answer:
-    from chuteflow.stability.answers import Answer
-    from chuteflow.stability.verdict import leading_modes, stability_of
+def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> StabilityAnswer:
+    from chuteflow.stability.answers import StabilityAnswer
+    from chuteflow.stability.result import leading_modes, stability_of
 
     try:
         stability = stability_of(flow, kx=kx, ky=ky)
     except InputError as error:
-        return Answer(flow, None, (), str(error))
+        return StabilityAnswer(flow, None, (), str(error))
     modes = () if stability.mode is None else (stability.mode,)
     if count > 1 and stability.mode is not None:
         # What leads at these wavenumbers may be unresolved, though this mode is known.
         with suppress(SolveError):
             modes = leading_modes(flow, stability.mode.kx, stability.mode.ky, count=count)
-    return Answer(flow, stability, tuple(modes), None)
+    return StabilityAnswer(flow, stability, tuple(modes), None)
 
 
-def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path: str) -> None:
+def _save(found: FlowSet, answers: Sequence[StabilityAnswer], scales: Scales | None, path: str) -> None:
     from chuteflow.io import stability_records
     from chuteflow.io.files import write_answer
 
@@ -127,7 +127,9 @@ def _save(found: FlowSet, answers: Sequence[Answer], scales: Scales | None, path
     )
 
 
-def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scales: Scales | None) -> Iterator[str]:
+def _report(
+    found: FlowSet, answers: Sequence[StabilityAnswer], near: Sequence[str], scales: Scales | None
+) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
     yield words.chute(found.chute)
@@ -146,12 +148,12 @@ def _report(found: FlowSet, answers: Sequence[Answer], near: Sequence[str], scal
         for i, answer in enumerate(answers, 1):
             yield f"{i}  {words.among(answer.flow, found)}: {_said(answer, scales)}"
             if answer.budget is not None:
-                yield f"   {_fed(answer.budget, _Said(found.chute, scales))}"
+                yield f"   {_fed(answer.budget, _DisturbanceFormat(found.chute, scales))}"
     yield words.searched(found.searched, found.chute, scales)
 
 
 @dataclass(frozen=True)
-class _Said:
+class _DisturbanceFormat:
     """Numbers of disturbances on a chute in words, with units where there are scales."""
 
     chute: Chute
@@ -170,95 +172,95 @@ class _Said:
         return f"{value * factor(name, self.chute, self.scales):.{digits}g}{unit}"
 
 
-def _rows(number: str, answer: Answer, columns: Sequence[str], scales: Scales | None) -> Iterator[list[str]]:
+def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: Scales | None) -> Iterator[list[str]]:
     from chuteflow.io import tables
     from chuteflow.io.contract import factor
 
     chute = answer.flow.chute
-    wave, rate, pace = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
+    wave, rate, speed_unit = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
     start = [number, *tables.numbers(answer.flow, columns, chute, scales)]
-    verdict = _VERDICTS[None if answer.found is None else answer.found.stable]
+    state = _STATES[None if answer.found is None else answer.found.stable]
     if not answer.modes:
-        yield [*start, verdict, *("-" for _ in range(6))]
+        yield [*start, state, *("-" for _ in range(6))]
     for i, mode in enumerate(answer.modes):
-        place = [*start, verdict] if i == 0 else [""] * (len(start) + 1)
-        speed = "-" if mode.speed is None else tables.number(pace * mode.speed)
+        place = [*start, state] if i == 0 else [""] * (len(start) + 1)
+        speed = "-" if mode.speed is None else tables.number(speed_unit * mode.speed)
         numbers = map(tables.number, (wave * mode.kx, wave * mode.ky, rate * mode.growth))
         yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
 
 
-def _said(answer: Answer, scales: Scales | None) -> str:
+def _said(answer: StabilityAnswer, scales: Scales | None) -> str:
     if answer.found is None:
         return f"not known: {answer.reason}"
-    found, said = answer.found, _Said(answer.flow.chute, scales)
+    found, said = answer.found, _DisturbanceFormat(answer.flow.chute, scales)
     return _of_all(found, said) if found.complete else _of_some(found, said)
 
 
-def _fed(budget: Budget, said: _Said) -> str:
+def _fed(budget: ModeBudget, said: _DisturbanceFormat) -> str:
     """What feeds a mode and what it loses most by, of its energy budget."""
     terms = sorted(budget.terms, key=lambda term: -term.total)
-    told = ", ".join(f"{term.name} {said('growth', term.total)}" for term in (*terms[:2], *terms[-2:]))
+    formatted = ", ".join(f"{term.name} {said('growth', term.total)}" for term in (*terms[:2], *terms[-2:]))
     growth = said("growth", budget.mode.growth)
-    return f"energy of the mode: {told}, of a growth rate of {growth}; closes to {abs(budget.closure):.0e}"
+    return f"energy of the mode: {formatted}, of a growth rate of {growth}; closes to {abs(budget.closure):.0e}"
 
 
-def _of_all(found: Stability, told: _Said) -> str:
-    """The verdict after all of the range was searched, and what stayed unresolved."""
+def _of_all(found: Stability, formatted: _DisturbanceFormat) -> str:
+    """The result after all of the range was searched, and what stayed unresolved."""
     from chuteflow.io.stability_records import why_unknown
 
     (low, high), mode = found.searched, found.mode
     if found.grows and mode is not None:
-        said = f"unstable: {_wave(mode, told)} grows by e in a time {told('time', 1.0 / mode.growth)}"
+        said = f"unstable: {_wave(mode, formatted)} grows by e in a time {formatted('time', 1.0 / mode.growth)}"
         if found.unresolved:
-            said += f"; others may grow faster at {_places(found, told)}, where the grids do not tell"
+            said += f"; others may grow faster at {_places(found, formatted)}, where the grids do not resolve it"
         return said
     slowest = "the continuous spectrum hides all modes"
     if mode is not None:
-        slowest = f"the slowest to decay is {_wave(mode, told)}"
+        slowest = f"the slowest to decay is {_wave(mode, formatted)}"
     if found.stable is None:
-        return f"not known: {why_unknown(found)}, at {_places(found, told)}; elsewhere {slowest}"
+        return f"not known: {why_unknown(found)}, at {_places(found, formatted)}; elsewhere {slowest}"
     rate, least, most = (
-        told.rounded("growth", found.smallest_rate, 2),
-        *(told.rounded("wavenumber", k, 3) for k in (low, high)),
+        formatted.rounded("growth", found.smallest_rate, 2),
+        *(formatted.rounded("wavenumber", k, 3) for k in (low, high)),
     )
     return f"stable: nothing grows faster than {rate} for wavenumbers from {least} to {most}; {slowest}"
 
 
-def _of_some(found: Stability, told: _Said) -> str:
+def _of_some(found: Stability, formatted: _DisturbanceFormat) -> str:
     """What the wave does that was asked about, or the fastest of those that were."""
     rest = "; whether the flow is stable is not known from this: give neither --kx nor --ky"
     mode = found.mode
     if mode is None:
-        unknown = "the grids do not tell what it does" if found.unresolved else "it decays: no mode is told"
-        return f"the wave at {_places(found, told)}: {unknown}{rest}" if found.unresolved else f"{unknown}{rest}"
+        unknown = "the grids do not resolve what it does" if found.unresolved else "it decays: no mode is resolved"
+        return f"the wave at {_places(found, formatted)}: {unknown}{rest}" if found.unresolved else f"{unknown}{rest}"
     if found.grows:
-        time = told("time", 1.0 / mode.growth)
-        return f"{_wave(mode, told)} grows by e in a time {time}: this wave makes the flow unstable"
+        time = formatted("time", 1.0 / mode.growth)
+        return f"{_wave(mode, formatted)} grows by e in a time {time}: this wave makes the flow unstable"
     if mode.growth < -found.smallest_rate:
-        return f"{_wave(mode, told)} decays by e in a time {told('time', -1.0 / mode.growth)}{rest}"
-    rate = told.rounded("growth", found.smallest_rate, 2)
-    return f"{_wave(mode, told)} neither grows nor decays faster than {rate}{rest}"
+        return f"{_wave(mode, formatted)} decays by e in a time {formatted('time', -1.0 / mode.growth)}{rest}"
+    rate = formatted.rounded("growth", found.smallest_rate, 2)
+    return f"{_wave(mode, formatted)} neither grows nor decays faster than {rate}{rest}"
 
 
-def _places(found: Stability, told: _Said) -> str:
+def _places(found: Stability, formatted: _DisturbanceFormat) -> str:
     """The unresolved wavenumbers, the first few of them."""
     some = ", ".join(
-        " and ".join(f"{name} = {told.rounded('wavenumber', k, 3)}" for name, k in (("kx", kx), ("ky", ky)))
+        " and ".join(f"{name} = {formatted.rounded('wavenumber', k, 3)}" for name, k in (("kx", kx), ("ky", ky)))
         for kx, ky in found.unresolved[:3]
     )
     more = len(found.unresolved) - 3
     return f"{some} and {more} more" if more > 0 else some
 
 
-def _wave(mode: Mode, told: _Said) -> str:
+def _wave(mode: Mode, formatted: _DisturbanceFormat) -> str:
     import math
 
     if mode.direction == "uniform":
         return "a disturbance that is the same all along the chute"
-    length = told("height", 2.0 * math.pi / math.hypot(mode.kx, mode.ky))
-    long = f"{length} grain diameters long" if told.scales is None else f"{length} long"
+    length = formatted("height", 2.0 * math.pi / math.hypot(mode.kx, mode.ky))
+    long = f"{length} grain diameters long" if formatted.scales is None else f"{length} long"
     what = {"along": "along the slope", "across": "across the slope", "oblique": "oblique to the slope"}
-    moves = "at rest" if mode.speed is None else f"with crests that move at {told('wave_speed', mode.speed)}"
+    moves = "at rest" if mode.speed is None else f"with crests that move at {formatted('wave_speed', mode.speed)}"
     if mode.speed is None and abs(mode.frequency) > mode.error:
-        moves = f"that oscillates with the frequency {told('frequency', abs(mode.frequency))}"
+        moves = f"that oscillates with the frequency {formatted('frequency', abs(mode.frequency))}"
     return f"a wave {what[mode.direction]}, {long}, {moves},"

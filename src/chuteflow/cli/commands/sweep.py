@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from chuteflow.sweeps.study import Study
 
 _EPILOG = (
-    "A study is a TOML file with the tables [design], [parameters], [search] and [results]. What is interrupted or "
-    "killed goes on where it was with the same command.\n\n"
+    "A study is a TOML file with the tables [design], [parameters], [search] and [results]. The same command "
+    "continues a study that was interrupted or killed.\n\n"
     "Example: chuteflow sweep study.toml --out study.zarr"
 )
 #: Seconds between two lines of progress where they are not written over each other, and else.
@@ -64,16 +64,18 @@ class Chunks(click.ParamType):
 
 @click.command("sweep", help=COMMANDS["sweep"], epilog=_EPILOG)
 @click.argument("study", metavar="STUDY")
-@options.option("--out", metavar="STORE", help="Zarr store to make or go on with, such as study.zarr.")
+@options.option("--out", metavar="STORE", help="Zarr store to create or continue, such as study.zarr.")
 @options.option("--workers", type=click.INT, help="Processes on this machine; one for each core by default.")
 @options.option("--cluster", metavar="ADDRESS", help="Use the dask.distributed scheduler at ADDRESS instead.")
-@options.option("--chunks", type=Chunks(), help="Compute these chunks alone: N, A:B or A:B:STEP, with commas between.")
-@click.option("--dry-run", is_flag=True, help="Tell points, chunks and an estimate of the time, and write nothing.")
-@click.option("--status", is_flag=True, help="Check the store, and tell what of it is done and which points failed.")
+@options.option("--chunks", type=Chunks(), help="Compute only these chunks: N, A:B or A:B:STEP, separated by commas.")
+@click.option(
+    "--dry-run", is_flag=True, help="Print the points, the chunks and an estimate of the time; write nothing."
+)
+@click.option("--status", is_flag=True, help="Check the store; print how much is done and which points failed.")
 @options.quiet_option
-@click.option("--no-check", is_flag=True, help="Believe the markers of the store: do not check its arrays.")
+@click.option("--no-check", is_flag=True, help="Trust the markers of the store; do not check its arrays.")
 def command(study: str, **given: Any) -> None:
-    """Read the study, compute what is left of it and tell what came out."""
+    """Read the study, compute the rest of it and print the results."""
     from chuteflow.sweeps.study import read
 
     read_study = read(study)
@@ -86,7 +88,7 @@ def command(study: str, **given: Any) -> None:
 
     if given["status"]:
         if not os.path.exists(given["out"]):
-            raise InputError(f"there is no store {given['out']} as yet: leave --status away to make it")
+            raise InputError(f"there is no store {given['out']} yet: omit --status to create it")
         click.echo("\n".join(_status(Store.made(given["out"], read_study), check=not given["no_check"])))
         return
     chosen = _chosen(read_study, given["chunks"])
@@ -133,11 +135,11 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
 
     try:
         with store.held(alone=alone):
-            found = _Found(store, chunks, check=check)
+            found = _CheckedChunks(store, chunks, check=check)
             for line in found.damage_lines():
                 click.echo(f"{line}: computed again", err=True)
             _begin(store, found, computing=len(found.sound) < len(chunks))
-            progress = Watch(len(chunks), len(found.sound))
+            progress = SweepProgress(len(chunks), len(found.sound))
             for marker in run(store, (chunk for chunk in chunks if chunk not in found.sound), workers):
                 progress.add(marker)
                 found.add(marker)
@@ -145,11 +147,11 @@ def _run(store: Store, chunks: Sequence[int], workers: Workers, *, alone: bool, 
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"stopped; to go on: chuteflow {shlex.join(sys.argv[1:])}") from None
     # Of the chunks that were not asked for, the markers have to do.
-    others = _Found(store, [chunk for chunk in store.done() if chunk not in found.sound], check=False)
+    others = _CheckedChunks(store, [chunk for chunk in store.done() if chunk not in found.sound], check=False)
     click.echo("\n".join(_totals(store, found.totals + others.totals)))
 
 
-def _begin(store: Store, found: _Found, *, computing: bool) -> None:
+def _begin(store: Store, found: _CheckedChunks, *, computing: bool) -> None:
     """Put the metadata in order, and say what has to be known of the store before chunks are added."""
     from chuteflow.sweeps.store import StoreError
 
@@ -168,7 +170,7 @@ def _begin(store: Store, found: _Found, *, computing: bool) -> None:
 
 
 @dataclass
-class Totals:
+class ChunkTotals:
     """Sums over chunks, and how many chunks each version of the program computed."""
 
     chunks: int = 0
@@ -187,12 +189,12 @@ class Totals:
         self.singly += marker.singly
         self.versions[marker.version] += 1
 
-    def __add__(self, other: Totals) -> Totals:
+    def __add__(self, other: ChunkTotals) -> ChunkTotals:
         sums = {one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
-        return Totals(**sums)
+        return ChunkTotals(**sums)
 
 
-class _Found:
+class _CheckedChunks:
     """What is found in a store of some chunks: which are sound, and what is wrong with the others."""
 
     def __init__(self, store: Store, chunks: Sequence[int], *, check: bool) -> None:
@@ -202,7 +204,7 @@ class _Found:
         self.damage: dict[int, str] = {}
         self.failures: list[tuple[int, str]] = []
         self.unchecked = 0
-        self.totals = Totals()
+        self.totals = ChunkTotals()
         wanted = chunks if isinstance(chunks, range) else frozenset(chunks)
         for chunk in sorted(store.done()):
             if chunk in wanted:
@@ -226,7 +228,7 @@ class _Found:
             yield f"{len(self.damage) - _MOST_LINES} more chunks are damaged"
 
 
-class Watch:
+class SweepProgress:
     """Lines on standard error: what is done and how long the rest will take."""
 
     def __init__(self, whole: int, done: int) -> None:
@@ -262,7 +264,7 @@ class Watch:
             f"{self._flows} flows, {self._failed} points failed, {_time(left)} left"
         )
         if self._line.is_shown:
-            self._line.tell(text)
+            self._line.show(text)
         elif not options.is_quiet():
             click.echo(text, err=True)
 
@@ -297,7 +299,7 @@ def _seconds(study: Study, points: int) -> float:
 
 
 def _status(store: Store, *, check: bool) -> Iterator[str]:
-    found = _Found(store, range(store.study.chunks), check=check)
+    found = _CheckedChunks(store, range(store.study.chunks), check=check)
     yield from _totals(store, found.totals)
     if not check:
         yield "the arrays have not been checked"
@@ -312,7 +314,7 @@ def _status(store: Store, *, check: bool) -> Iterator[str]:
         yield f"point {point}: {why}"
 
 
-def _totals(store: Store, totals: Totals) -> Iterator[str]:
+def _totals(store: Store, totals: ChunkTotals) -> Iterator[str]:
     yield (
         f"{store.path}: {totals.chunks} of {store.study.chunks} chunks, {totals.points} points, "
         f"{totals.flows} flows, {totals.failed} points failed, {totals.singly} points solved one by one"

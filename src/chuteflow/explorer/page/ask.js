@@ -1,4 +1,5 @@
-// Questions to the server.
+// Questions to the server, or to what the page has with it.
+import { answered, kept } from "./kept.js";
 
 // How often a question is asked again that the server has no room for, and after how many milliseconds.
 const attempts = 10, pause = 300;
@@ -7,6 +8,7 @@ const patience = 400;
 
 /** The answer to a question, with its status if that is not 200; `signal` takes it back, which the server notices. */
 export async function ask(question, query, signal) {
+  if (kept) return answered(question, query);
   for (let attempt = 1; ; attempt++) {
     let answer, status;
     try {
@@ -23,6 +25,9 @@ export async function ask(question, query, signal) {
     signal?.throwIfAborted();
   }
 }
+
+/** What can be set, cases and quantities. */
+export const askAbout = async () => kept?.about ?? (await fetch("about")).json();
 
 /** One question of a kind is under way at a time; of those that come meanwhile, only the last is asked. */
 export class Latest {

@@ -63,11 +63,24 @@ function path(points, sx, sy) {
 /** A label as markup of SVG: what follows "_" is set lower. */
 const lowered = (label) => escaped(label).replace(/_(\w+)(.*)/, '<tspan dy="3" font-size="9">$1</tspan><tspan dy="-3">$2</tspan>');
 
+/** Marks as the beginning of an element, whose title and end follow. */
 const shapes = {
   circle: (x, y) => `<circle class="special" cx="${x}" cy="${y}" r="4.5">`,
   diamond: (x, y) => `<path class="special" d="M${x} ${y - 5.5}l5.5 5.5l-5.5 5.5l-5.5-5.5z">`,
   triangle: (x, y) => `<path class="special" d="M${x - 5} ${y - 4}h10l-5 9z">`,
+  bar: (x, y) => `<path class="limit" d="M${x} ${y - 7}v14">`,
+  unstable: (x, y) => `<path class="verdict unstable" d="M${x - 4} ${y - 4}l8 8m-8 0l8-8">`,
+  stable: (x, y) => `<path class="verdict stable" d="M${x - 4} ${y - 4}h8v8h-8z">`,
+  unknown: (x, y) => `<text class="verdict unknown" x="${x}" y="${y + 4}" text-anchor="middle">?`,
+  pin: (x, y, { letter }) => `<g class="pin"><path d="M${x - 5} ${y - 5}h10v10h-10z"/><text x="${x - 8}" y="${y - 7}">${letter}</text>`,
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
+};
+
+/** Marks of what was measured. */
+const measuredShapes = {
+  circle: (x, y) => `<circle cx="${x}" cy="${y}" r="3"/>`,
+  diamond: (x, y) => `<path d="M${x} ${y - 4}l4 4l-4 4l-4-4z"/>`,
+  triangle: (x, y) => `<path d="M${x - 3.5} ${y - 3}h7l-3.5 6z"/>`,
 };
 
 function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
@@ -91,9 +104,9 @@ function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
  * Draw into `svg`, without what has no place; returns the scales `sx`, `sy` and the frame `box`.
  *
  * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}, hatched without a
- * colour. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
+ * colour. `points`: {x, y, across, up (errors), shape, colour, title}, beneath all lines. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
-export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = [], hair }) {
+export function draw(svg, { x: across, y: up, areas = [], points: measured = [], lines = [], marks = [], hair }) {
   const x = sound(across), y = sound(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
@@ -106,13 +119,17 @@ export function draw(svg, { x: across, y: up, areas = [], lines = [], marks = []
     const paint = colour ? `fill="${colour}" stroke="${colour}"` : `class="unknown" fill="url(#${svg.id}-hatch)"`;
     inside.push(`<path d="${rings.map((points) => `${path(points, sx, sy)}z`).join("")}" ${paint} stroke-width=".7"/>`);
   }
+  for (const point of measured.filter((one) => known([sx(one.x), sy(one.y)]))) {
+    const [px, py, l, r, t, b] = [sx(point.x), sy(point.y), sx(point.x - (point.across ?? 0)), sx(point.x + (point.across ?? 0)), sy(point.y + (point.up ?? 0)), sy(point.y - (point.up ?? 0))].map((v) => (Number.isFinite(v) ? v.toFixed(1) : "0"));
+    inside.push(`<g class="measured" stroke="${point.colour}"><path d="M${l} ${py}H${r}M${px} ${t}V${b}"/>${measuredShapes[point.shape](Number(px), Number(py))}<title>${escaped(point.title)}</title></g>`);
+  }
   for (const { points, colour, dash, width: thick = 2, beneath } of lines) {
     inside.push(`<path class="${beneath ? "beneath" : "line"}" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
   }
   if (known([sx(hair), 0])) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
   for (const mark of marks.filter((one) => known([sx(one.x), sy(one.y)]))) {
     const shape = shapes[mark.shape](Number(sx(mark.x).toFixed(1)), Number(sy(mark.y).toFixed(1)), mark);
-    inside.push(`${shape}<title>${escaped(mark.title)}</title>${shape.startsWith("<path") ? "</path>" : "</circle>"}`);
+    inside.push(`${shape}<title>${escaped(mark.title)}</title></${shape.match(/\w+/)[0]}>`);
   }
   svg.innerHTML = `<pattern id="${svg.id}-hatch" class="hatch" width="7" height="7" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M3 0V7"/></pattern>
     <clipPath id="${svg.id}-clip"><rect x="${box.l - 8}" y="${box.t - 8}" width="${Math.max(0, box.r - box.l + 16)}" height="${box.b - box.t + 8}"/></clipPath>

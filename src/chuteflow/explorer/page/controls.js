@@ -6,7 +6,8 @@ import { factor, unit } from "./units.js";
 
 const steps = 1000;
 const controls = {};
-let set = null, choices = {};
+const offered = [];
+let set = null, choices = {}, latest = null;
 
 /** The place of a slider that is nearest to a value. */
 function position({ low, high, logarithmic }, value) {
@@ -25,23 +26,56 @@ export function makeControls(about, setter) {
   for (const [name, control] of Object.entries(about.controls)) makeSlider(name, control);
   choices = about.choices;
   for (const [name, choice] of Object.entries(choices)) makeChoice(name, choice);
+  foldWhereSmall();
   byId("controls").addEventListener("submit", (event) => event.preventDefault());
-  about.presets.forEach((preset, i) => byId("presets").append(new Option(preset.title, i)));
-  byId("presets").addEventListener("change", (event) => {
-    if (event.target.value !== "") set({ ...about.presets[event.target.value].state, flow: 0 }, event);
-    event.target.value = "";
-  });
+  makeCases(about);
   takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
   takeTyped("rho", "density of the grains", (typed) => (typed > 0 ? { rho: typed } : null), "a number above 0");
   for (const name of ["theme", "against"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
-  for (const name of ["si", "whole"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
+  for (const name of ["si", "whole", "judge"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
+}
+
+/** Cases to choose from, in groups; which of them the controls show is seen from their numbers. */
+function makeCases({ presets, cases }) {
+  const groups = [["Views of the paper", presets], ["Chutes and materials", cases]];
+  for (const [label, those] of groups) {
+    const group = Object.assign(document.createElement("optgroup"), { label });
+    for (const one of those) {
+      group.append(new Option(one.title, String(offered.length)));
+      offered.push({ words: "", ...one });
+    }
+    byId("presets").append(group);
+  }
+  addControl('<p id="case-words"></p>');
+  byId("presets").addEventListener("change", (event) => {
+    const one = offered[event.target.value];
+    if (!one) { showCase(); return; }
+    latest = one;
+    set({ ...one.state, flow: 0 }, event);
+    showCase();
+  });
+}
+
+/** The case that was chosen last, if it still holds, or the first that holds: all that it says is so. */
+function showCase() {
+  const holds = (one) => Object.entries(one.state).every(([name, value]) => state[name] === String(value));
+  const found = latest && holds(latest) ? latest : offered.find(holds);
+  byId("presets").value = found ? String(offered.indexOf(found)) : "";
+  byId("case-words").textContent = found?.words ?? "";
+}
+
+/** On a phone the sliders fold away; elsewhere there is room for them. */
+function foldWhereSmall() {
+  const small = matchMedia("(max-width: 700px)"), fold = () => { byId("fold").open = !small.matches; };
+  small.addEventListener("change", fold);
+  fold();
 }
 
 function addControl(markup) {
   const box = document.createElement("div");
   box.className = "control";
   box.innerHTML = markup;
-  byId("controls").append(box);
+  byId("sliders").append(box);
   return box;
 }
 
@@ -93,14 +127,17 @@ export function showControls() {
     field.value = fieldText(shown);
     slider.value = String(position(control, value));
     slider.setAttribute("aria-valuetext", `${number(shown)} ${units}`.trim());
+    field.dataset.shown = field.value;
     byId(`${name}-unit`).textContent = units || "–";
     byId(`${name}-unit`).title = units ? "" : "dimensionless";
   }
-  byId("angle").value = fieldText(degrees(Number(state.slope)));
+  byId("folded").textContent = Object.entries(controls).map(([name, { symbol: letter }]) => `${letter} ${byId(name).value}`).join(", ");
+  if (controls.slope) byId("angle").value = fieldText(degrees(Number(state.slope)));
   for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
-  for (const name of ["si", "whole"]) byId(name).checked = Boolean(state[name]);
+  for (const name of ["si", "whole", "judge"]) byId(name).checked = Boolean(state[name]);
   byId("grains").hidden = !state.si;
+  showCase();
 }
 
 /** The flux, or NaN where the state has none that can be. */

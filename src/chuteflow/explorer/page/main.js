@@ -1,34 +1,48 @@
 // The page: the state changes, questions are asked, and the panels are redrawn when answers come.
-import { Latest } from "./ask.js";
+import { ask, askAbout, AtRest, Latest } from "./ask.js";
 import { number } from "./chart.js";
 import { makeControls, showControls } from "./controls.js";
 import * as curve from "./curve.js";
 import * as chutePicture from "./grains.js";
+import { kept } from "./kept.js";
 import * as map from "./map.js";
 import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
+import * as measurements from "./measured.js";
+import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
 import * as stability from "./stability.js";
-import { address, change, chute, grains, ofChute, ofLooks, onChange, start, state, write } from "./state.js";
+import * as story from "./story.js";
+import { address, canRedo, canUndo, change, chute, grains, ofChute, ofLooks, onChange, onSteps, redo, settle, start, state, undo, write } from "./state.js";
 import { factor, setQuantities, unit } from "./units.js";
 
-const about = await (await fetch("about")).json();
+const about = await askAbout();
 setQuantities(about.quantities);
-start(about.presets[0].state);
+start(about.presets[0].state, about.fixed);
 byId("version").textContent = about.version;
 
 let flows = null, mark = 0;
 const chosen = () => Math.max(0, Math.min(Number(state.flow) || 0, (flows?.flows.length ?? 1) - 1));
 
-/** Change the state because of `event`, whose time the redraw is measured from. */
+/** Change the state because of `event`, whose time the redraw is measured from. What is done with one click is a step of its own. */
 function set(parts, event) {
+  const alone = event?.type === "change" || event?.type === "click";
   mark = event?.timeStamp ?? performance.now();
+  if (alone) settle();
   change(parts);
+  if (alone) settle();
 }
 
 // --- answers ----------------------------------------------------------------------------------------------------
 
 /** Whether a panel waits for an answer, said after a while. */
 const waits = (panel) => (waiting) => byId(panel).setAttribute("aria-busy", String(waiting));
+
+/** Where the curve passes limits of the theory takes longer than the curve itself: it is asked when the sliders rest. */
+const limits = new AtRest(150, async (signal) => {
+  const answer = await ask("limits", chute(), signal);
+  signal.throwIfAborted();
+  if (!answer.error) curve.takeLimits(answer.words);
+});
 
 const asks = {
   flows: new Latest("flows", waits("words"), (answer, query, since) => take(answer, "flows", since, () => {
@@ -38,7 +52,11 @@ const asks = {
     stability.restart(flows.flows.length);
     showFlows();
   })),
-  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => curve.takeCurve(answer))),
+  curve: new Latest("curve", waits("curve-panel"), (answer, query, since) => take(answer, "curve", since, () => {
+    curve.takeCurve(answer);
+    if (!answer.error) limits.begin();
+    stability.again();
+  })),
 };
 
 const refused = {};
@@ -68,7 +86,10 @@ function askFlows() {
   stability.stop();
   asks.flows.ask({ ...chute(), Q: state.Q, ...grains() }, mark);
 }
-const askCurve = () => asks.curve.ask({ ...chute(), ...grains() }, mark);
+function askCurve() {
+  limits.stop();
+  asks.curve.ask({ ...chute(), ...grains() }, mark);
+}
 
 onChange((has) => {
   if (has("theme")) {
@@ -79,9 +100,12 @@ onChange((has) => {
   if (ofChute(has) || has("Q") || words) askFlows();
   if (ofChute(has) || words) askCurve();
   showControls();
-  if (has("Q", "against", "whole")) curve.redraw();
+  if (has("Q", "against", "whole", "judge")) curve.redraw();
+  if (has("against", "whole", "judge")) stability.again();
+  if (has("pin")) pins.load();
+  if (has("story")) story.show();
   if (has("flow") || ofLooks(has)) showFlows();
-  map.changed(has);
+  if (!kept) map.changed(has);
 });
 
 // --- flows --------------------------------------------------------------------------------------------------------
@@ -102,7 +126,8 @@ function showFlows() {
   byId("flows").innerHTML = list.map(row).join("");
   if (focused) byId("flows").querySelector("input:checked")?.focus();
   stability.show();
-  drawProfiles(list, flows.top, k);
+  pins.show();
+  drawProfiles(list, flows.top, k, pins.pinned());
   curve.takeFlows(list, k);
   // The rest comes a frame later, so that flows and profiles follow the slider as closely as they can.
   requestAnimationFrame(() => setTimeout(showRest));
@@ -121,16 +146,22 @@ byId("flows").addEventListener("change", (event) => set({ flow: event.target.val
 
 // --- what can be taken along ------------------------------------------------------------------------------------
 
-/** Tables and pictures that the server makes: the link is of the state at the time of the click. */
+/** A link to what the server makes of the state at the time of the click. */
+function exported(link, what, format) {
+  const refresh = () => { link.href = `ask/export?${new URLSearchParams({ ...chute(), Q: state.Q, ...grains(), what, format })}`; };
+  link.addEventListener("click", refresh);
+  link.addEventListener("focus", refresh);
+}
+
+/** Tables and pictures that the server makes. */
 for (const [what, title] of [["profiles", "Profiles of all fields"], ["curve", "Curve of all flows"]]) {
   const item = document.createElement("li");
+  item.className = "served";
   item.append(`${title}: `);
   for (const format of ["csv", "svg", "png"]) {
     const link = Object.assign(document.createElement("a"), { textContent: format.toUpperCase(), download: "", href: "#" });
     link.dataset.export = `${what}-${format}`;
-    const refresh = () => { link.href = `ask/export?${new URLSearchParams({ ...chute(), Q: state.Q, ...grains(), what, format })}`; };
-    link.addEventListener("click", refresh);
-    link.addEventListener("focus", refresh);
+    exported(link, what, format);
     item.append(link, " ");
   }
   byId("exports").append(item);
@@ -144,6 +175,11 @@ for (const kind of ["svg", "png"]) {
   picture.append(button, " ");
 }
 byId("exports").append(picture);
+const whole = document.createElement("li");
+whole.className = "served";
+whole.innerHTML = 'This chute at every flux, as one page that needs no server: <a href="#" download data-export="page-html">HTML</a>';
+exported(whole.querySelector("a"), "page", "html");
+byId("exports").append(whole);
 
 for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEventListener("click", async () => {
   write();
@@ -154,14 +190,53 @@ for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEve
   setTimeout(() => { byId("copied").textContent = ""; }, 2500);
 });
 
+// --- steps back and forth ---------------------------------------------------------------------------------------
+
+for (const [id, step] of [["undo", undo], ["redo", redo]]) byId(id).addEventListener("click", step);
+function showSteps() {
+  for (const [id, can] of [["undo", canUndo()], ["redo", canRedo()]]) byId(id).setAttribute("aria-disabled", String(!can));
+}
+onSteps(showSteps);
+addEventListener("keydown", (event) => {
+  const key = event.key.toLowerCase(), step = key === "y" || event.shiftKey ? redo : undo;
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || (key !== "z" && key !== "y")) return;
+  // What is being typed has an undo of its own.
+  const { dataset, value } = event.target;
+  if (dataset.shown !== undefined && dataset.shown !== value) return;
+  event.preventDefault();
+  step();
+});
+
 // --- the beginning ----------------------------------------------------------------------------------------------
 
 document.documentElement.dataset.theme = state.theme;
 makeControls(about, set);
 showControls();
-curve.begin(set);
-map.begin(about, set);
-function redraw() { forgetColours(); showFlows(); map.redraw(); }
+showSteps();
+curve.begin(set, about.validity);
+measurements.begin(about.data, set, () => {
+  showFlows();
+  curve.redraw();
+});
+pins.begin(set, () => {
+  showFlows();
+  curve.redraw();
+}, chosen);
+story.begin(set);
+if (kept) tellKept(kept.says);
+else map.begin(about, set);
+/** What a page that needs no server is of: below the flux, or at the end where there is no room. */
+function tellKept(says) {
+  const words = document.createElement("section");
+  words.id = "kept-words";
+  words.innerHTML = `<h2>What this page is of</h2>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
+  (innerWidth > 700 ? byId("sliders") : document.querySelector("main")).append(words);
+}
+function redraw() {
+  forgetColours();
+  showFlows();
+  if (!kept) map.redraw();
+}
 new ResizeObserver(redraw).observe(document.querySelector("main"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 mark = performance.now();

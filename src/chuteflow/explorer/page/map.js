@@ -1,7 +1,8 @@
 // The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair to drag.
 import { ask, AtRest } from "./ask.js";
-import { draw } from "./chart.js";
+import { draw, number } from "./chart.js";
 import { byId, colour, sentence } from "./page.js";
+import * as readout from "./readout.js";
 import { chute, state } from "./state.js";
 
 const svg = byId("map"), key = byId("map-key"), selects = { x: byId("map-x"), y: byId("map-y") };
@@ -17,14 +18,18 @@ const shadings = {
   interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
 };
 // Columns to begin with, and how narrow the stretches between columns may become, or those beside an unknown one.
-const first = 8, finest = 64, finestUnknown = 16;
+const first = 8, finest = 64, finestUnknown = 16, evenly = Array.from({ length: first + 1 }, (_, i) => i / first);
 // What is not known of a column has a value of its own, which is hatched.
 const unknown = -1;
 // Places near which a column is looked at closely, at most.
 const mostNear = 32;
-let about = null, set = null, failure = "", shown = null, holding = false;
+let about = null, set = null, failure = "", shown = null, holding = false, pointer = null;
 // What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
 let wanted = {}, columns = [], whole = false, drawn = null;
+// Whether the columns are coarse ones, of while the sliders move, and whether the map is in view.
+let rough = false, seen = true;
+// Parts of a stretch between two columns that are drawn straight.
+const bends = 6;
 
 /** `given` is what the server says about itself; `setter` (parts, event) changes the state. */
 export function begin(given, setter) {
@@ -49,15 +54,54 @@ export function changed(has) {
   // A cross-hair that moves asks nothing: one map serves all of its positions.
   const moved = has("x", "y", "surface", "closure") || names.some((name) => has(name) && name !== state.x && name !== state.y);
   if (moved || has("shade")) asking.begin();
+  if (moved && seen) roughly.ask();
   if (has("shade")) drawn = null;
   if (!shown || moved || has("shade", "theme")) redraw(); else placeHair();
 }
 
-const asking = new AtRest(150, async (signal) => {
+/** What is asked of a map: all of the state but the cross-hair. */
+function question() {
   const { x, y } = state, held = Object.entries(chute()).filter(([name]) => name !== x && name !== y);
-  const query = { ...Object.fromEntries(held), x, y };
-  const known = JSON.stringify(query) === JSON.stringify(wanted) ? columns : [];
-  let places = known.length ? narrower(known) : Array.from({ length: first + 1 }, (_, i) => i / first);
+  return { ...Object.fromEntries(held), x, y };
+}
+
+new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; }).observe(svg);
+
+/** A coarse map while the sliders move, one at a time: the last that is wanted comes next. */
+const roughly = {
+  busy: false,
+  next: null,
+  ask() {
+    this.next = question();
+    if (!this.busy) this.work();
+  },
+  async work() {
+    this.busy = true;
+    while (this.next) {
+      const query = this.next;
+      this.next = null;
+      const found = [], left = [...evenly];
+      // Two at a time: a browser has few connections, and flows must not wait for one.
+      const some = async () => {
+        for (let place = left.shift(); place !== undefined; place = left.shift()) found.push({ ...await ask("map", { ...query, place, coarse: 1 }), place });
+      };
+      await Promise.all([some(), some()]);
+      found.sort((a, b) => a.place - b.place);
+      // What is wrong is said by the map that follows.
+      if (found.some((column) => column.error && column.status !== 422)) continue;
+      const here = question(), axes = here.x === query.x && here.y === query.y;
+      if (!axes || (!rough && JSON.stringify(here) === JSON.stringify(wanted))) continue;
+      rough = true;
+      take(query, found.map((column) => (column.error ? withoutAnswer(query, column.place) : column)), false);
+    }
+    this.busy = false;
+  },
+};
+
+const asking = new AtRest(150, async (signal) => {
+  const query = question();
+  const known = !rough && JSON.stringify(query) === JSON.stringify(wanted) ? columns : [];
+  let places = known.length ? narrower(known) : evenly;
   failure = "";
   while (places.length) {
     for (const place of places) {
@@ -72,10 +116,13 @@ const asking = new AtRest(150, async (signal) => {
       }
       known.push({ ...(column.error ? withoutAnswer(query, place) : column), place });
       known.sort((a, b) => a.place - b.place);
-      if (known.length > first) take(query, known, false);
+      if (known.length <= first) continue;
+      rough = false;
+      take(query, known, false);
     }
     places = narrower(known);
   }
+  rough = false;
   take(query, known, true);
 });
 
@@ -128,11 +175,32 @@ function corresponding(a, b, span) {
 }
 
 /**
- * Where the stops of two columns are half-way between them. Those that correspond meet half-way; a band that only
- * one column has ends there in a point, and what begins or ends at a side of the map does so at that side.
+ * How steep each boundary is at each column: such that curves through all columns do not swing (Fritsch and Carlson).
+ * `pairs` are the stops that correspond, of each two neighbours.
  */
-function middles(a, b, low, high) {
-  const pairs = corresponding(a, b, high - low), ends = [[...a.stops], [...b.stops]], meet = ([i, j]) => (a.stops[i] + b.stops[j]) / 2;
+function slopes(seen, pairs) {
+  const secant = (i, [j, k]) => (seen[i + 1].stops[k] - seen[i].stops[j]) / (seen[i + 1].at - seen[i].at);
+  return seen.map(({ stops }, i) => stops.map((_, k) => {
+    const before = pairs[i - 1]?.find((pair) => pair[1] === k), after = pairs[i]?.find((pair) => pair[0] === k);
+    const [left, right] = [before && secant(i - 1, before), after && secant(i, after)];
+    if (left === undefined || right === undefined) return left ?? right ?? 0;
+    return left * right <= 0 ? 0 : (2 * left * right) / (left + right);
+  }));
+}
+
+/** A boundary from one column to the next, at a share `w` of the way. */
+function along(w, from, to, steep0, steep1, width) {
+  const v = 1 - w;
+  return v * v * (1 + 2 * w) * from + w * w * (3 - 2 * w) * to + w * v * v * width * steep0 - w * w * v * width * steep1;
+}
+
+/**
+ * Where the stops of two columns are half-way between them. Those that correspond, as `pairs`, are where `meet` (pair)
+ * says; a band that only one column has ends there in a point, and what begins or ends at a side of the map does so at
+ * that side.
+ */
+function middles(a, b, pairs, meet, low, high) {
+  const ends = [[...a.stops], [...b.stops]];
   const differs = { first: a.values[0] !== b.values[0], last: a.values.at(-1) !== b.values.at(-1) };
   let before = [-1, -1], least = low;
   for (const pair of [...pairs, [a.stops.length, b.stops.length]]) {
@@ -160,13 +228,26 @@ function narrower(found) {
   return places;
 }
 
-/** For each two halves of a stretch between columns: where they begin and end, and stops and values there. */
-function* halves(found, part, low, high) {
+/** No boundary passes the one below it. */
+const ordered = (stops) => stops.map((_, k) => Math.max(...stops.slice(0, k + 1)));
+
+/** For many narrow stretches between columns: where they begin and end, and stops and values there. */
+function* stretches(found, part, low, high) {
+  const seen = found.map((one) => ({ at: one.at, ...part(one) })), pairs = seen.slice(1).map((b, i) => corresponding(seen[i], b, high - low)), steep = slopes(seen, pairs);
   for (let i = 1; i < found.length; i++) {
-    const [a, b] = [part(found[i - 1]), part(found[i])], [from, to] = [found[i - 1].at, found[i].at], middle = (from + to) / 2;
-    const [left, right] = middles(a, b, low, high);
-    yield [from, middle, a.stops, left, a.values];
-    yield [middle, to, right, b.stops, b.values];
+    const [a, b] = [seen[i - 1], seen[i]], width = b.at - a.at, those = pairs[i - 1];
+    const meet = ([j, k], w = 0.5) => along(w, a.stops[j], b.stops[k], steep[i - 1][j], steep[i][k], width);
+    const [left, right] = middles(a, b, those, meet, low, high);
+    // What corresponds bends, the rest goes straight to where it ends or from where it begins.
+    const leftAt = (w) => ordered(a.stops.map((stop, j) => { const pair = those.find((one) => one[0] === j); return pair ? meet(pair, w) : stop + (left[j] - stop) * 2 * w; }));
+    const rightAt = (w) => ordered(b.stops.map((stop, k) => { const pair = those.find((one) => one[1] === k); return pair ? meet(pair, w) : right[k] + (stop - right[k]) * (2 * w - 1); }));
+    for (const [from, stopsAt, values] of [[0, leftAt, a.values], [0.5, rightAt, b.values]]) {
+      const parts = those.length ? bends / 2 : 1;
+      for (let n = 0; n < parts; n++) {
+        const [start, end] = [n, n + 1].map((one) => from + one / (2 * parts));
+        yield [a.at + start * width, a.at + end * width, stopsAt(start), stopsAt(end), values];
+      }
+    }
   }
 }
 
@@ -175,13 +256,13 @@ function pieces(found, x) {
   const { outer, inner } = found[0], { low, high } = about.controls[inner], areas = new Map(), lines = [];
   const at = (o, i) => (outer === x ? [o, i] : [i, o]);
   let open = [];
-  for (const [from, to, start, end, values] of halves(found, shaded, low, high)) {
+  for (const [from, to, start, end, values] of stretches(found, shaded, low, high)) {
     const before = open;
     open = [];
     values.forEach((value, k) => {
       const [p, q] = [start, end].map((stops) => [low, ...stops, high].slice(k, k + 2));
       if (p[0] === p[1] && q[0] === q[1]) return;
-      // What goes on from one half to the next is one area, without a seam.
+      // What goes on from one stretch to the next is one area, without a seam.
       let area = before.find((one) => one.value === value && one.ends[0] === p[0] && one.ends[1] === p[1]);
       if (!area) {
         area = { value, down: [at(from, p[0])], up: [at(from, p[1])] };
@@ -193,7 +274,7 @@ function pieces(found, x) {
     });
   }
   for (const [value, those] of areas) areas.set(value, those.map(({ down, up }) => [...down, ...up.reverse()]));
-  for (const [from, to, start, end] of halves(found, ({ parts }) => parts?.hot ?? { stops: [], values: [unknown] }, low, high)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
+  for (const [from, to, start, end] of stretches(found, ({ parts }) => parts?.hot ?? { stops: [], values: [unknown] }, low, high)) start.forEach((stop, k) => lines.push([at(from, stop), at(to, end[k])]));
   return { areas, lines };
 }
 
@@ -228,7 +309,8 @@ export function redraw() {
   const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
   key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
-  key.append(failure || (current && whole ? "" : ` Drawing: ${current ? columns.length : 0} columns so far.`));
+  if (pointer) readPointer();
+  key.append(failure || (current && whole ? "" : rough ? " Coarse, until the sliders rest." : ` Drawing: ${current ? columns.length : 0} columns so far.`));
   svg.classList.toggle("failed", Boolean(failure));
 }
 
@@ -243,10 +325,49 @@ function move(event) {
 svg.addEventListener("pointerdown", (event) => { holding = true; svg.setPointerCapture(event.pointerId); move(event); });
 svg.addEventListener("pointermove", (event) => { if (holding) move(event); });
 for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { holding = false; });
-svg.addEventListener("keydown", (event) => {
-  const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[event.key];
-  if (!turn) return;
-  event.preventDefault();
-  const name = state[turn[0]], { low, high } = about.controls[name], value = (Number(state[name]) || low) + (turn[1] * (high - low)) / 200;
-  set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) }, event);
+/** Whether a place is within a ring of points. */
+function within(ring, [x, y]) {
+  let inside = false;
+  ring.forEach(([x1, y1], i) => {
+    const [x0, y0] = ring.at(i - 1);
+    if (y1 > y !== y0 > y && x < x1 + ((y - y1) / (y0 - y1)) * (x0 - x1)) inside = !inside;
+  });
+  return inside;
+}
+
+/** Show what the map says at a place; returns it in words. */
+function read(x, y) {
+  const current = columns.length && wanted.x === state.x && wanted.y === state.y;
+  const found = current ? [...drawn.areas].find(([, rings]) => rings.some((ring) => within(ring, [x, y])))?.[0] ?? unknown : unknown;
+  const { name, label } = shadings[state.shade];
+  const says = [...[[state.x, x], [state.y, y]].map(([axis, value]) => `${about.controls[axis].label.toLowerCase()} ${number(value)}`), `${label}: ${found === unknown ? "not known" : name(found)}`];
+  readout.place(svg, shown, { x: shown.sx(x), y: shown.sy(y), says: says.map((text) => ({ text })) });
+  return says.join(", ");
+}
+/** The same where the pointer is, if that is on the map. */
+function readPointer() {
+  const [x, y] = [shown.sx.inverse(pointer[0]), shown.sy.inverse(pointer[1])];
+  const inside = [[state.x, x], [state.y, y]].every(([name, value]) => value >= about.controls[name].low && value <= about.controls[name].high);
+  if (inside && !holding) read(x, y); else readout.clear(svg);
+}
+const readHere = () => readout.speak(read(Number(state[state.x]), Number(state[state.y])));
+
+readout.follow(svg, {
+  over: (...at) => {
+    pointer = at;
+    readPointer();
+  },
+  away: () => {
+    pointer = null;
+    readout.clear(svg);
+  },
+  key: (pressed) => {
+    if (!pressed) { readHere(); return true; }
+    const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[pressed];
+    if (!turn) return false;
+    const name = state[turn[0]], { low, high } = about.controls[name], value = (Number(state[name]) || low) + (turn[1] * (high - low)) / 200;
+    set({ [name]: Number(Math.min(high, Math.max(low, value)).toPrecision(4)) });
+    readHere();
+    return true;
+  },
 });

@@ -1,27 +1,32 @@
 // The state of the page is its address: whoever opens a copied address sees the same.
 
 const listeners = [];
-const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
+export const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
 const defaults = {
-  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", x: "slope", y: "roughness", shade: "most",
+  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", judge: "1", pin: "", story: "", x: "slope", y: "roughness", shade: "most",
 };
 // What can be chosen from few; numbers and names of the chute are checked by the server, which says what is wrong.
 const parameters = ["slope", "e", "ew", "roughness"];
 const allowed = {
-  si: ["", "1"], whole: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
+  si: ["", "1"], whole: ["", "1"], judge: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
   shade: ["most", "families", "density", "interior"],
 };
-let first = {}, due = null;
+// What holds the state back from the address: a finger or button that is down, or changes within the last moments.
+const rest = 250;
+let first = {}, unchanged = [], due = null, held = false, written = "", newest = 0, told = () => {};
 export const state = {};
 
-/** Take the state of the address, over the defaults and over `preset`. */
-export function start(preset) {
+/** Take the state of the address, over the defaults and over `preset`, in which the `fixed` names stay. */
+export function start(preset, fixed = []) {
+  unchanged = fixed;
   first = { ...defaults, ...Object.fromEntries(Object.entries(preset).map(([name, value]) => [name, String(value)])) };
   Object.assign(state, fromAddress());
+  written = address();
+  newest = place();
 }
 
 function fromAddress() {
-  const given = new URLSearchParams(location.search), known = (name) => given.has(name) && (allowed[name]?.includes(given.get(name)) ?? true);
+  const given = new URLSearchParams(location.search), known = (name) => given.has(name) && !unchanged.includes(name) && (allowed[name]?.includes(given.get(name)) ?? true);
   const taken = Object.fromEntries(Object.entries(first).map(([name, value]) => [name, known(name) ? given.get(name) : value]));
   return taken.x === taken.y ? { ...taken, x: defaults.x, y: defaults.y } : taken;
 }
@@ -32,12 +37,25 @@ export function change(parts) {
   if (!changed.length) return;
   for (const name of changed) state[name] = String(parts[name]);
   for (const listen of listeners) listen((...names) => names.some((name) => changed.includes(name)));
-  // Browsers allow some hundred changes of the address in half a minute: wait until a drag pauses.
-  clearTimeout(due);
-  due = setTimeout(write, 120);
+  wait();
 }
 
-addEventListener("popstate", () => change(fromAddress()));
+/** One step back is one drag, not each of its places: the address is written when all rests. */
+function wait() {
+  clearTimeout(due);
+  due = setTimeout(() => { if (held) wait(); else write(); }, rest);
+  told();
+}
+
+addEventListener("pointerdown", () => { held = true; }, true);
+for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => { held = false; }, true);
+addEventListener("popstate", () => {
+  change(fromAddress());
+  clearTimeout(due);
+  due = null;
+  written = address();
+  told();
+});
 
 /** `listen` is called after each change with a function that tells whether any of some names changed. */
 export function onChange(listen) { listeners.push(listen); }
@@ -47,10 +65,36 @@ export function address() {
   return `${location.pathname}?${new URLSearchParams(shown)}`;
 }
 
+/** Put the state into the address, as a step that can be taken back. */
 export function write() {
   clearTimeout(due);
-  history.replaceState(null, "", address());
+  due = null;
+  if (address() !== written) {
+    written = address();
+    newest = place() + 1;
+    // Browsers allow some hundred steps in half a minute, and none where the page may not know its address.
+    try { history.pushState({ place: newest }, "", address()); } catch { /* then there is nothing to take back */ }
+  }
+  told();
 }
+
+const place = () => history.state?.place ?? 0;
+
+/** `listen` is called whenever `canUndo` or `canRedo` may have changed. */
+export function onSteps(listen) { told = listen; }
+export const canUndo = () => due !== null || place() > 0;
+export const canRedo = () => due === null && place() < newest;
+
+/** What waits to be written becomes a step now. */
+export function settle() { if (due !== null) write(); }
+
+/** Take back the last step. */
+export function undo() {
+  settle();
+  if (canUndo()) history.back();
+}
+
+export function redo() { if (canRedo()) history.forward(); }
 
 /** The parameters of the chute, for a question. */
 export const chute = () => Object.fromEntries(material.map((name) => [name, state[name]]));

@@ -4,10 +4,11 @@ import { state } from "./state.js";
 let quantities = {};
 export function setQuantities(given) { quantities = given; }
 
-export function factor(symbol) {
+/** What a dimensionless value is multiplied with, on a chute of this slope. */
+export function factor(symbol, slope = state.slope) {
   if (!state.si) return 1;
   const [a, b, c] = quantities[symbol].dimension;
-  const value = Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(state.slope))) ** c;
+  const value = Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(slope))) ** c;
   // An address may hold grains or a slope that cannot be, which the server then says.
   return value > 0 && Number.isFinite(value) ? value : 1;
 }

@@ -9,6 +9,6 @@ from chuteflow.paper.claims import model  # noqa: F401, I001
 from chuteflow.paper.claims import far_field, three_flows, flow_curves, stability  # noqa: F401
 from chuteflow.paper.claims import productive_flows, interface  # noqa: F401
 from chuteflow.paper.claims import hot_flows, domains, heat_flux  # noqa: F401
-from chuteflow.paper.claims.registry import CLAIMS, VERDICTS, Claim, Verdict, check, matching, shown
+from chuteflow.paper.claims.registry import CLAIMS, VERDICTS, Claim, ClaimResult, check, matching, shown
 
-__all__ = ["CLAIMS", "VERDICTS", "Claim", "Verdict", "check", "matching", "shown"]
+__all__ = ["CLAIMS", "VERDICTS", "Claim", "ClaimResult", "check", "matching", "shown"]

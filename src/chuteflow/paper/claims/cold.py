@@ -1,6 +1,6 @@
 """The limit of the coldest, densest flows: between which slopes it exists.
 
-# notation: y = q/(p sqrt(T)) heat flux, N = loss - s^2 work dissipation less production, a conduction, k coupling.
+# notation: y = q/(p sqrt(T)) heat flux, N = loss - s^2 work dissipation minus production, a conduction, k coupling.
 
 Where the volume fraction tends to nu* the closures of the overburden form tend to constants, and the energy balance is
 that of uniform grains: p y' + y + y (p T'/T)/2 = p N with p T'/T = p theta' + k (1 - p theta') and y = a theta'. Far
@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from chuteflow import Chute
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.theory import boundary
 from chuteflow.theory.constitutive import reduce
 from chuteflow.theory.laws import law
@@ -33,11 +33,11 @@ def cold_slope_bounds(chute: Chute) -> tuple[float, float]:
     k = float(r.coupling[0] * nu / (r.stiffness[0] + r.coupling[0] * nu))
 
     def given(slope: float) -> float:
-        slip = boundary.slip_coefficient(r.shear, r.grip, chute.roughness, slope)
+        slip = boundary.slip_coefficient(r.shear, r.wall_shear, chute.roughness, slope)
         return slope * float(slip[0]) - boundary.base_loss(chute.wall_restitution, chute.roughness)
 
     def surplus(slope: float) -> float:
         net = max(float(r.loss[0] - slope**2 * r.work[0]), 0.0)
         return given(slope) - math.sqrt(2.0 * float(r.conduction[0]) * net / (1.0 - k))
 
-    return bisected(given, 0.0, 10.0), bisected(surplus, 0.0, 10.0)
+    return bisect(given, 0.0, 10.0), bisect(surplus, 0.0, 10.0)

@@ -9,14 +9,14 @@ import numpy as np
 
 from chuteflow import Chute, curve, flows, hot
 from chuteflow.maps import exists_at
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.paper.claims.cold import cold_slope_bounds
 from chuteflow.paper.claims.hot_flows import slope_of_lambda
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import PRODUCTIVE, SLOPE, all_flows, curve_of, folds, hot_flow
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.theory.boundary import ROUGHNESS_RANGE
-from chuteflow.theory.hot import Budget, budget, hot_solution, inversion_lambda, slope_at, slope_bounds
+from chuteflow.theory.hot import HotEnergyBudget, budget, hot_solution, inversion_lambda, slope_at, slope_bounds
 
 #: The bound that section 4.3 gives for lambda.
 PRINTED = 2.284
@@ -392,7 +392,7 @@ def interior_bound() -> Finding:
     )
 
 
-def _budget(lambda_: float) -> Budget:
+def _budget(lambda_: float) -> HotEnergyBudget:
     return budget(hot(dissipative(SLOPE)).parameters.dilute, 0.8, 0.6, lambda_)
 
 
@@ -410,7 +410,7 @@ def bounds_of_slope() -> Finding:
     def surplus(square: float) -> float:
         return b.m * square - b.l - math.sqrt(max(b.L - b.M * square, 0.0))
 
-    highest = math.sqrt(bisected(surplus, b.l / b.m, b.L / b.M))
+    highest = math.sqrt(bisect(surplus, b.l / b.m, b.L / b.M))
     back = {"lambda at theta_0": hot(dissipative(highest)).parameters.lambda_}
     F21 = hot(dissipative(lowest)).parameters.F21
     return decide(

@@ -13,7 +13,7 @@ from chuteflow.paper.claims.shared import SLOPE, Array, named_flows, profile_slo
 from chuteflow.paper.materials import dissipative
 from chuteflow.theory.hot import Dilute
 
-#: Volume fractions at which far fields are looked at, where their terms of next order are small or can be removed.
+#: Volume fractions at which far fields are examined, where their terms of next order are small or can be removed.
 _THIN = 1e-5
 
 

@@ -1,4 +1,4 @@
-"""Section 3.5, figures 3 and 4: families of flows, and how they change with the slope."""
+"""Section 3.5, figures 3 and 4: branches of flows, and how they change with the slope."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _counts(numbers: list[int]) -> str:
     "Between mass hold-up and centre-of-mass there is a one-to-one relationship at tan(theta) = 0.3.",
 )
 def holdup_one_to_one() -> Finding:
-    """Whether M rises and h falls all along the family; the same a little steeper."""
+    """Whether M rises and h falls all along the branch; the same a little steeper."""
 
     def monotonic(slope: float) -> bool:
         (branch,) = _curve(slope).branches
@@ -86,7 +86,7 @@ def holdup_one_to_one() -> Finding:
         "one-to-one",
         "one-to-one" if monotonic(SLOPE) else "not one-to-one",
         holds=monotonic(SLOPE),
-        reason="Along the family from hot to cold M rises and h falls all the way; at tan(theta) = 0.32 "
+        reason="Along the branch from hot to cold M rises and h falls all the way; at tan(theta) = 0.32 "
         f"{'too' if monotonic(0.32) else 'no longer, as M turns'}.",
     )
 
@@ -212,7 +212,7 @@ def cold_steep() -> Finding:
         "increase",
         {f"{slope:g}": "Q = " + _list([flow.mass_flux for flow in row]) for slope, row in found.items()},
         holds=rising,
-        reason="Deepest flows at T_inf = 0.1, 0.01, 0.001; at 0.34 there is also a family of thin flows, whose flux "
+        reason="Deepest flows at T_inf = 0.1, 0.01, 0.001; at 0.34 there is also a branch of thin flows, whose flux "
         "falls.",
     )
 
@@ -233,7 +233,7 @@ def no_inversion_on_gentle_slopes() -> Finding:
         0.29,
         onset,
         holds=rounds_to(onset, "0.29"),
-        reason="The slope from which on some flow of the family is inverted.",
+        reason="The slope from which on some flow of the branch is inverted.",
     )
 
 

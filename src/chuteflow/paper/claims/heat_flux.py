@@ -71,9 +71,9 @@ def temperature_gradient_dominates() -> Finding:
     main, far = {}, {}
     for name, flow in named_flows().items():
         at = flow.profile(np.linspace(0.0, 3.0 * flow.depth, 1201))
-        share = np.abs(at.density_heat_flux / at.conductive_heat_flux)
+        fraction = np.abs(at.density_heat_flux / at.conductive_heat_flux)
         mass = at.heat_flux > 0.5 * at.heat_flux.max()
-        main[name], far[name] = float(share[mass].max()), float(share[-1])
+        main[name], far[name] = float(fraction[mass].max()), float(fraction[-1])
     return decide(
         "dominates",
         {

@@ -12,7 +12,7 @@ from chuteflow import Chute, Flow, HotModel, hot
 from chuteflow.paper.claims.registry import Finding, claim, close, decide, rounds_to
 from chuteflow.paper.claims.shared import GENTLE, SLOPE, Array, hot_flow
 from chuteflow.paper.materials import dissipative, productive
-from chuteflow.steady.hot import Shot, shoot
+from chuteflow.steady.hot import ShootingSolution, shoot
 from chuteflow.theory.boundary import kappa
 from chuteflow.theory.hot import HotSolution, expansion, hot_solution, slope_at
 
@@ -153,7 +153,7 @@ def no_analytic_solution() -> Finding:
 
 
 @cache
-def _shot(lambda_: float, s: tuple[float, ...], mu: float = 0.0) -> Shot:
+def _shot(lambda_: float, s: tuple[float, ...], mu: float = 0.0) -> ShootingSolution:
     return shoot(lambda_, mu, np.array(s))
 
 

@@ -148,7 +148,7 @@ def interface_transition() -> Finding:
         {"folds up to 0.33": 2.0, "folds from 0.34": 1.0},
         {f"{slope:g}": float(n) for slope, n in zip(slopes, numbers["interface"], strict=True)},
         holds=numbers["interface"] == expected and numbers["free"] == expected,
-        reason="Numbers of folds of Q by slope, the same with both conditions. As on the half-line, at 0.34 a family "
+        reason="Numbers of folds of Q by slope, the same with both conditions. As on the half-line, at 0.34 a branch "
         f"of cold, dense flows is left beside the fold: {cold} flows share Q = 50.",
     )
 

@@ -277,10 +277,10 @@ def base_energy() -> Finding:
         nu, T, zero = flow.base_volume_fraction, flow.base_temperature, np.zeros(1)
         g = closures(np.array([nu]), E)
         g1, g2, g0 = nu * g.compressibility[0], g.viscosity[0], g.radial[0]
-        grip = 0.5 * ROUGHNESS**2 * (1.0 + WALL_CONTACT * (1.0 + 5.0 / (8.0 * nu * g0)))
-        f1 = SLOPE / k * (math.sqrt(math.pi / 2.0) + (k - grip) * g1 / g2)
+        wall_shear = 0.5 * ROUGHNESS**2 * (1.0 + WALL_CONTACT * (1.0 + 5.0 / (8.0 * nu * g0)))
+        f1 = SLOPE / k * (math.sqrt(math.pi / 2.0) + (k - wall_shear) * g1 / g2)
         loss = 2.0 * (1.0 - WALL) / (1.0 + lid)
-        work = k * f1**2 - g1 * SLOPE / g2 * (k - grip) * f1
+        work = k * f1**2 - g1 * SLOPE / g2 * (k - wall_shear) * f1
         printed[name] = float(g1 * math.sqrt(2.0 / math.pi) * (work - loss))
         depth = 0.5 * flow.centre_of_mass
         falls = profile_slope(flow, "granular_temperature", 0.0, depth)(zero)[0]

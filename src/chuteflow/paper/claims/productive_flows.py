@@ -68,7 +68,7 @@ def productive_temperature() -> Finding:
     "one-to-one.",
 )
 def productive_one_to_one() -> Finding:
-    """Whether there are folds, and several families."""
+    """Whether there are folds, and several branches."""
     found = {slope: curve_of(productive(slope)) for slope in PRODUCTIVE}
     single = all(len(c.branches) == 1 and not folds(c) for c in found.values())
     monotonic = all(bool(np.all(np.diff(c.branches[0].centre_of_mass) < 0.0)) for c in found.values())
@@ -76,7 +76,7 @@ def productive_one_to_one() -> Finding:
         1.0,
         float(max(count(c, MASS_FLUX) for c in found.values())),
         holds=single and monotonic,
-        reason="Every curve is one family without folds, along which Q and h fall together with T_inf.",
+        reason="Every curve is one branch without folds, along which Q and h fall together with T_inf.",
     )
 
 

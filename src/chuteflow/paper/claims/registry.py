@@ -1,8 +1,8 @@
 """What a claim is, how its verdict is decided, and the table of all claims.
 
 A claim is one function without arguments that computes and returns a :class:`Finding`, under the decorator
-:func:`claim`. The verdict follows from what was computed: ``holds`` tells whether the statement holds as printed;
-where it does not, ``corrected`` tells whether what is said in its place does, by an argument of its own.
+:func:`claim`. The verdict follows from what was computed: ``holds`` is whether the statement holds as printed;
+where it does not, ``corrected`` is whether what is said in its place does, by an argument of its own.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ClaimResult:
     """The outcome of one claim.
 
     ``source`` is the place in the paper; ``printed`` and ``computed`` are numbers, words, or several by name, which
@@ -63,10 +63,12 @@ class Claim:
         """The sections that the source names, such as "4.3" or "appendix"."""
         return tuple(re.findall(r"(?<=section )\d(?:\.\d)?|appendix", self.source))
 
-    def check(self) -> Verdict:
+    def check(self) -> ClaimResult:
         """Compute, and give the verdict."""
         found = self.test()
-        return Verdict(self.id, self.statement, self.source, found.printed, found.computed, found.verdict, found.reason)
+        return ClaimResult(
+            self.id, self.statement, self.source, found.printed, found.computed, found.verdict, found.reason
+        )
 
 
 #: All claims by id, in the order of the paper.
@@ -85,7 +87,7 @@ def claim(id: str, source: str, statement: str) -> Callable[[Callable[[], Findin
     return enter
 
 
-def check(ids: Iterable[str] | None = None) -> Iterator[Verdict]:
+def check(ids: Iterable[str] | None = None) -> Iterator[ClaimResult]:
     """The verdicts on the claims ``ids``, by default on all, computed one at a time in the order of the paper.
 
     Raises:

@@ -8,9 +8,9 @@ from chuteflow import Chute, Flow, Stability, flows, stability_of
 from chuteflow.paper.claims.registry import Finding, claim, decide
 from chuteflow.paper.claims.shared import SLOPE, named_flows
 from chuteflow.paper.materials import dissipative
-from chuteflow.stability.budget import Budget, energy_budget
+from chuteflow.stability.budget import ModeBudget, energy_budget
 
-#: Surface temperatures of the family of figure 3 that stand for it beside flows A and C, hot to cold.
+#: Surface temperatures of the branch of figure 3 that stand for it beside flows A and C, hot to cold.
 _WARMTH = (20.0, 1.7, 1.2, 0.5)
 #: A flow of a sample of chutes, steep and far from elastic, and its surface temperature.
 _STEEP = Chute(0.568, 0.627, 0.478, 0.847), 9.9
@@ -22,7 +22,7 @@ _PART_2 = "section 3.5, and Part 2"
 
 
 @cache
-def _judged() -> dict[str, tuple[Flow, Stability]]:
+def _stability_of_flows() -> dict[str, tuple[Flow, Stability]]:
     """Flows of the paper's chute by name, from hot to cold, with their stability."""
     chute = dissipative(SLOPE)
     chosen = {f"T_inf = {T:g}": flows(chute, T_surface=T)[0] for T in _WARMTH}
@@ -51,8 +51,8 @@ def _kind(found: Stability) -> str:
 )
 def three_unstable_modes() -> Finding:
     """Directions of the modes that grow fastest."""
-    judged = _judged()
-    leaders = {"flow A": judged["flow A"][1], "flow C": judged["flow C"][1], "a steep flow": _steep()}
+    found_by_name = _stability_of_flows()
+    leaders = {"flow A": found_by_name["flow A"][1], "flow C": found_by_name["flow C"][1], "a steep flow": _steep()}
     kinds = {name: _kind(found) for name, found in leaders.items()}
     numbers = "; ".join(
         f"{name}: {_kind(found)}, k h = {_depth_wavenumber(found):.2g}, growth {found.mode.growth:.2g}"
@@ -80,13 +80,13 @@ def _depth_wavenumber(found: Stability) -> float:
 )
 def stable_in_a_small_part() -> Finding:
     """Which flows of the paper's chute are stable."""
-    kinds = {name: _kind(found) for name, (_, found) in _judged().items()}
+    kinds = {name: _kind(found) for name, (_, found) in _stability_of_flows().items()}
     stable = [name for name, kind in kinds.items() if kind == "stable"]
     return decide(
         "a small part",
         kinds,
         holds=0 < len(stable) < 0.5 * len(kinds),
-        reason=f"{len(stable)} of {len(kinds)} flows of the family of figure 3 are stable, those in its middle: hotter "
+        reason=f"{len(stable)} of {len(kinds)} flows of the branch of figure 3 are stable, those in its middle: hotter "
         "ones are unstable across the slope, colder ones along it. Of a random sample of 82 flows 13 are stable.",
     )
 
@@ -99,29 +99,29 @@ def stable_in_a_small_part() -> Finding:
 def inversion_and_stability() -> Finding:
     """Whether each of the two goes with either of the other."""
     seen = {}
-    for name, (flow, found) in _judged().items():
+    for name, (flow, found) in _stability_of_flows().items():
         if found.stable is not None:
             seen.setdefault(f"{flow.density}, {'stable' if found.stable else 'unstable'}", name)
     return decide(
         "no correlation",
         seen,
         holds=len(seen) == 4,
-        reason="Along the family of figure 3 alone there are stable and unstable flows with and without a density "
+        reason="Along the branch of figure 3 alone there are stable and unstable flows with and without a density "
         "inversion: neither implies the other. In a random sample of 82 flows fewer of the inverted ones are stable, 1 "
         "of 22, than of the others, 12 of 60, which hints at a weak trend.",
     )
 
 
 @cache
-def _budgets() -> dict[str, Budget]:
+def _budgets() -> dict[str, ModeBudget]:
     """Energy budgets of the fastest modes: of one of each kind, and of two where something else may feed it."""
-    judged = _judged()
+    found_by_name = _stability_of_flows()
     chute, temperature = _STEEP_ALONG
     vortices, flux = _VORTICES
     (inverted,) = (flow for flow in flows(vortices, Q=flux) if flow.density == "inverted")
     fastest = {
-        "flow A": judged["flow A"][1],
-        "flow C": judged["flow C"][1],
+        "flow A": found_by_name["flow A"][1],
+        "flow C": found_by_name["flow C"][1],
         "a steep flow": _steep(),
         "a steep flow, along": stability_of(flows(chute, T_surface=temperature)[0]),
         "an inverted flow, short waves": stability_of(inverted),
@@ -129,7 +129,7 @@ def _budgets() -> dict[str, Budget]:
     return {name: energy_budget(found.mode) for name, found in fastest.items() if found.mode is not None}
 
 
-def _source(budget: Budget) -> tuple[str, float]:
+def _source(budget: ModeBudget) -> tuple[str, float]:
     """What feeds a mode most: the collisional loss, both of its parts together, or another term, and its rate."""
     rates = {term.name: term.total for term in budget.terms if term.name not in _LOSS}
     rates["collisional loss"] = budget.rate(*_LOSS)

@@ -7,22 +7,25 @@ two flows of one mass flux meet (section 3.5), is where d ln Q along the unit ta
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.continuation import Control, Monitor, Point, locate, trace
+from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, Monitor, locate, trace
+from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.mapped.solution import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
-from chuteflow.steady.solver import Condition, Status
+from chuteflow.steady.solver import Condition, SolverStatus
 
 #: How a curve is followed; lengths are in the plane (ln S, ln Q). Points are solved again more closely.
-CONTROL = Control(initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600)
-#: Range of T_surface followed unless another is asked for: few chutes are within reach of N = 400 below it.
+CONTROL = ContinuationSettings(
+    initial_step=0.05, min_step=1e-6, max_step=0.3, max_angle=0.3, tolerance=1e-7, max_points=600
+)
+#: Range of T_surface followed by default: few chutes are within reach of N = 400 below it.
 SURFACE_TEMPERATURE = (0.05, 100.0)
 #: Estimated relative error of Q, h and M up to which a flow is taken for one.
 TOLERANCE = 1e-8
@@ -43,7 +46,7 @@ class MappedPoint:
 
 @dataclass(frozen=True, eq=False)
 class MappedCurve:
-    """A family of flows in order along its curve, from hot to cold at the start.
+    """A branch of flows in order along its curve, from hot to cold at the start.
 
     All are converged to TOLERANCE. ``special`` are the flows of turning mass flux and at the onset of a density
     inversion, in the same order; ``ends`` says in words why the curve ends at either side.
@@ -79,24 +82,16 @@ class MappedCurve:
         return np.array([flow.surface_temperature for flow in self.flows])
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """What is met on one side of the start, kinds (empty for a plain flow) with flows, and why the side ends."""
-
-    met: list[tuple[str, MappedSolution]]
-    end: str
-
-
 def mapped_curve(
     start: Flow | MappedSolution,
     *,
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
-    control: Control = CONTROL,
+    control: ContinuationSettings = CONTROL,
 ) -> MappedCurve:
-    """The family through ``start``, to both sides, as far as it goes in a range of T_surface.
+    """The branch through ``start``, to both sides, as far as it goes in a range of T_surface.
 
     Args:
-        start: a flow of the family.
+        start: a flow of the branch.
         surface_temperature: lowest and highest T_surface; the last flow of a side is the first one outside.
         control: how the curve is followed.
 
@@ -114,51 +109,48 @@ def mapped_curve(
     if not first.converged:
         return MappedCurve((), (), (first.status.value, first.status.value))
     bounds = (float(np.log(low)), float(np.log(high)))
-    hot, cold = (_side(first, direction, bounds, control) for direction in (1.0, -1.0))
-    met = [*hot.met[::-1], ("", first), *cold.met]
-    flows = tuple(flow for kind, flow in met if not kind)
-    return MappedCurve(flows, tuple(_special(met)), (hot.end, cold.end))
+    # The curve runs from hot to cold.
+    found = follow_both_sides(lambda sign: _side(first, -sign, bounds, control))
+    special = tuple(MappedPoint(event.kind, event.point, event.position) for event in found.events)
+    return MappedCurve(found.points, special, found.ends)
 
 
-def _special(met: Sequence[tuple[str, MappedSolution]]) -> Iterator[MappedPoint]:
-    before = -1
-    for kind, flow in met:
-        if kind:
-            yield MappedPoint(kind, flow, before)
-        else:
-            before += 1
-
-
-def _side(first: MappedSolution, direction: float, bounds: tuple[float, float], control: Control) -> _Side:
+def _side(
+    first: MappedSolution, direction: float, bounds: tuple[float, float], control: ContinuationSettings
+) -> Side[MappedSolution]:
     """From ``first`` on, towards larger (1) or smaller (-1) S."""
     degree = min(d for d in DEGREES if d >= min(first.degree, LARGEST_DEGREE))
     system, matrix = first.system.transferred(degree, first.system.multiple)
     z = matrix @ first.z
     ahead = np.zeros(len(z))
     ahead[-2] = direction
-    path = trace(system, z, direction=ahead, control=control)
-    met: list[tuple[str, MappedSolution]] = []
-    taken, previous = 0.0, None
-    for point in path:
-        if previous is not None and point.step > 0.0:
-            special = list(_between(previous, point, control))
-            met += special
-            if special or point.arclength > taken + _SPACING:
-                taken = point.arclength
-                flow = _as_flow(point)
-                end = _unresolved(flow)
-                if end:
-                    return _Side(met, end)
-                met.append(("", flow))
-                end = _outside(flow, bounds)
-                if end:
-                    return _Side(met, end)
-        previous = point
-    return _Side(met, path.status.value)
+    reached = 0.0
+
+    def extend(
+        side: Side[MappedSolution], previous: CurvePoint[MappedSystem] | None, point: CurvePoint[MappedSystem]
+    ) -> None:
+        nonlocal reached
+        if previous is None or point.step == 0.0:
+            return
+        special = list(_between(previous, point, control))
+        for kind, flow in special:
+            side.add(flow, kind)
+        if not special and point.arclength <= reached + _SPACING:
+            return
+        reached = point.arclength
+        flow = _as_flow(point)
+        end = _unresolved(flow)
+        if not end:
+            side.add(flow)
+            end = _outside(flow, bounds)
+        if end:
+            side.stop(end)
+
+    return follow_side(trace(system, z, direction=ahead, control=control), Side(first), extend)
 
 
 def _between(
-    previous: Point[MappedSystem], point: Point[MappedSystem], control: Control
+    previous: CurvePoint[MappedSystem], point: CurvePoint[MappedSystem], control: ContinuationSettings
 ) -> Iterator[tuple[str, MappedSolution]]:
     """Kinds and flows of the special points of a step, as far as they are resolved."""
     for kind, monitor in _MONITORS.items():
@@ -188,7 +180,7 @@ _MONITORS: dict[str, Monitor[MappedSystem]] = {"fold-Q": _flux_slope, "density-i
 def _unresolved(flow: MappedSolution) -> str:
     """Why ``flow`` is not taken for one; empty where it is."""
     if not np.isfinite(flow.error):
-        return Status.NO_CONVERGENCE.value
+        return SolverStatus.NO_CONVERGENCE.value
     return "" if flow.error <= TOLERANCE else f"the series are not resolved with N = {LARGEST_DEGREE}"
 
 
@@ -201,7 +193,7 @@ def _outside(flow: MappedSolution, bounds: tuple[float, float]) -> str:
     return ""
 
 
-def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
+def _as_flow(point: CurvePoint[MappedSystem]) -> MappedSolution:
     """A point of a trace as a flow with its estimated error: solved again in a plane across the curve."""
     system = point.system
     _, _, macroscopic, gradient = system.evaluate(point.z)
@@ -209,7 +201,7 @@ def _as_flow(point: Point[MappedSystem]) -> MappedSolution:
     along[LOG_H] = 0.0
     along /= np.linalg.norm(along)
     plane = Condition((along[LOG_Q], 0.0, along[LOG_M], along[LOG_T]), float(along @ macroscopic))
-    near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, Status.CONVERGED, point.iterations)
+    near = MappedSolution(system, point.z, macroscopic, np.inf, np.inf, SolverStatus.CONVERGED, point.iterations)
     flow = solve_mapped(system.chute, near, plane, system.degree, multiple=system.multiple)
     if flow.error <= TOLERANCE or system.degree == LARGEST_DEGREE:
         return flow

@@ -31,7 +31,7 @@ What is unknown, and what determines it:
   coefficients: 2N+5 unknowns. Equations: 2N at the nodes, (3.17), the normal stress (3.31) and the heat flux
   (3.32) at zeta = 0, and (3.26): 2N+4.
 
-One equation is missing on purpose: flows form families. A condition on Q, h, M or T singles out a flow; without
+One equation is missing on purpose: flows form branches. A condition on Q, h, M or T singles out a flow; without
 one the system is ready for continuation, through folds of Q.
 """
 
@@ -54,7 +54,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.kinds import density_kind
-from chuteflow.steady.solver import TOLERANCE, Condition, Status, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Condition, SolverStatus, checked_tolerance
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
@@ -76,7 +76,7 @@ _CHECK = 1.25
 _SAFETY = 3.0
 #: With a larger residual between the nodes, a solution of the discrete equations is none of the equations.
 _SPURIOUS = 0.3
-#: Where X is below this share of its largest value, it falls with height: there a rise would be an error.
+#: Where X is below this fraction of its largest value, it falls with height: there a rise would be an error.
 _THIN = 0.05
 #: X may dip below zero in the far field by so much of its largest value.
 _DIP = 1e-3
@@ -136,13 +136,13 @@ def sampling(degree: int) -> Sampling:
 
 
 @dataclass(frozen=True, eq=False)
-class Local:
+class PointValues:
     """Functions of the fields at single points, arrays of one shape, with the scale S taken out.
 
     ``nu`` volume fraction; ``momentum`` residual of (3.8); ``flux`` phi, and ``conduction`` its part along the
-    temperature gradient; ``heating`` right-hand side of (3.9) times omega; ``stress`` p; ``base`` residual of
-    (3.17); ``surface`` residuals of the conditions at zeta = 0; ``mass`` x^2; ``glide`` s (g1/g2) x^2 y/nu, with
-    du/dz = glide/S^(1/2); ``slip`` F1 y; ``dissipation`` g5/nu^2.
+    temperature gradient; ``heating`` right-hand side of (3.9) times omega; ``stress`` p; ``base`` residual of (3.17);
+    ``surface`` residuals of the conditions at zeta = 0; ``mass`` x^2; ``scaled_shear_rate`` s (g1/g2) x^2 y/nu, with
+    du/dz = scaled_shear_rate/S^(1/2); ``slip`` F1 y; ``dissipation`` g5/nu^2.
     """
 
     nu: Field
@@ -154,7 +154,7 @@ class Local:
     base: Field
     surface: tuple[Field, ...]
     mass: Field
-    glide: Field
+    scaled_shear_rate: Field
     slip: Field
     dissipation: Field
 
@@ -228,7 +228,7 @@ class MappedSystem:
         """ln (Q, h, M, T_surface) (4,) of the fields: (3.26) and (3.27) by quadrature in zeta."""
         return self.evaluate(z)[2]
 
-    def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> Local:
+    def local(self, x: Field, dx: Field, y: Field, dy: Field, log_scale: Field, omega: Field) -> PointValues:
         """Functions of the fields at points; arguments may be complex, for derivatives."""
         chute, chosen = self.chute, self.chute.law
         s, kappa = chute.slope, self.kappa
@@ -250,7 +250,7 @@ class MappedSystem:
             surface = (stress - boundary.INTERFACE_STRESS, flux - surface_flux * stress * y)
         else:
             surface = (y - 1.0,)
-        return Local(
+        return PointValues(
             nu=nu,
             momentum=2.0 / kappa * omega * (g1_slope * y2 * dx + big_g * x * y * dy) - x,
             flux=flux,
@@ -260,7 +260,7 @@ class MappedSystem:
             base=flux - base_flux * stress * y,
             surface=surface,
             mass=mass,
-            glide=s * work * mass * y,
+            scaled_shear_rate=s * work * mass * y,
             slip=slip * y,
             dissipation=g.dissipation,
         )
@@ -395,7 +395,7 @@ class _Evaluation:
         m, kappa, scale = self.sampling, self.system.kappa, self.scale
         nodes, omega = slice(1, -1), self.omega[1:-1]
         mass, mass_z = self.both(self.at.mass / self.omega, nodes)  # nu dz/dzeta over kappa
-        glide, glide_z = self.both(self.at.glide / self.omega, nodes)
+        scaled_shear_rate, shear_rate_z = self.both(self.at.scaled_shear_rate / self.omega, nodes)
         slip, slip_z = (part[0] for part in self.both(self.at.slip, slice(-1, None)))
         surface_z = np.zeros(mass_z.shape[1])
         surface_z[self.n_x : -2] = m.basis[0, : self.n_y] * 2.0 / self.y_surface
@@ -408,9 +408,11 @@ class _Evaluation:
 
         holdup, holdup_z = kappa * (m.weights @ mass), kappa * (m.weights @ mass_z)
         moment, moment_z = m.weights / omega @ above, gradient_of_sum(m.weights / omega)  # over kappa S
-        carried = slip * holdup + kappa * (m.weights @ (above * glide))  # Q over sqrt(S)
+        carried = slip * holdup + kappa * (m.weights @ (above * scaled_shear_rate))  # Q over sqrt(S)
         carried_z = slip * holdup_z + holdup * slip_z
-        carried_z = carried_z + kappa * (gradient_of_sum(m.weights * glide) + (m.weights * above) @ glide_z)
+        carried_z = carried_z + kappa * (
+            gradient_of_sum(m.weights * scaled_shear_rate) + (m.weights * above) @ shear_rate_z
+        )
         by_scale = np.zeros_like(surface_z)
         by_scale[-2] = 1.0
         root = np.sqrt(scale)
@@ -439,13 +441,13 @@ class MappedSolution:
     macroscopic: Array
     error: float
     residual: float
-    status: Status
+    status: SolverStatus
     iterations: int
 
     @property
     def converged(self) -> bool:
         """Whether Newton's method converged, and to the tolerance where one was given."""
-        return self.status is Status.CONVERGED
+        return self.status is SolverStatus.CONVERGED
 
     @property
     def chute(self) -> Chute:
@@ -528,7 +530,7 @@ class MappedSolution:
         root = np.exp(0.5 * self.z[-2])
         y = _series(system.split(self.z)[1], zeta, 0)
         scaled_flux = omega * root
-        shear_rate = at.glide / root
+        shear_rate = at.scaled_shear_rate / root
         return Profile(
             height=z.copy(),
             volume_fraction=at.nu,
@@ -544,7 +546,7 @@ class MappedSolution:
             dissipation=at.dissipation * at.nu**2 * (root * y) ** 3,
         )
 
-    def _local(self, zeta: Array) -> Local:
+    def _local(self, zeta: Array) -> PointValues:
         a, b, log_scale, _ = self.system.split(self.z)
         x, dx, y, dy = (_series(c, zeta, order) for c in (a, b) for order in (0, 1))
         return self.system.local(x, dx, y, dy, np.asarray(log_scale), self.system.omega(zeta))
@@ -554,7 +556,7 @@ class MappedSolution:
         """Coefficients of u(zeta), from (3.10) upwards from the slip velocity (3.15)."""
         m, root = sampling(self.degree), np.exp(0.5 * self.z[-2])
         nodes = m.points[1:-1]
-        rate = self._local(nodes).glide / self.system.omega(nodes)
+        rate = self._local(nodes).scaled_shear_rate / self.system.omega(nodes)
         gained = 0.5 * chebyshev.chebint(m.to_coefficients @ rate, lbnd=1)
         velocity = -self.system.kappa * root * gained
         velocity[0] += root * float(self._local(np.ones(1)).slip[0])
@@ -583,7 +585,7 @@ def solve_mapped(
     Args:
         chute: the chute, which may differ from that of ``start`` in all but the surface.
         start: a flow to start from.
-        condition: which flow of the family.
+        condition: which flow of the branch.
         degree: N of (3.28), at least 4.
         multiple: k of (3.30), by default that of :func:`best_multiple` for ``start``.
 
@@ -605,8 +607,8 @@ def refine(
 ) -> MappedSolution:
     """The flow on ``chute`` nearest to ``start`` that meets ``condition``, to a relative ``tolerance`` in Q, h and M.
 
-    The first degree is where the coefficients of ``start`` have decayed to the tolerance. Each solution is judged
-    by a step of Newton's method at a larger degree, and the degree raised as the error asks for. Other
+    The first degree is where the coefficients of ``start`` have decayed to the tolerance. The error of each solution is
+    estimated by a step of Newton's method at a larger degree, and the degree raised as the error asks for. Other
     arguments as for :func:`solve_mapped`. Where ``largest_degree`` does not suffice the status says so.
 
     Raises:
@@ -625,7 +627,7 @@ def refine(
             return replace(found, iterations=iterations)
         growth = 1.5
         if found.converged:
-            found = replace(found, status=Status.UNRESOLVED)
+            found = replace(found, status=SolverStatus.UNRESOLVED)
             z = smaller.transferred(largest_degree, system.multiple)[1] @ found.z
             # The error falls by the same factor with each coefficient more.
             growth = float(np.clip(np.log(0.1 * tolerance) / np.log(min(found.error, 0.1)), 1.1, 2.0))
@@ -675,8 +677,8 @@ def _sampled(system: MappedSystem, flow: Flow) -> Array:
 def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolution:
     """The flow near ``z`` that meets ``condition``, and its error.
 
-    The error is judged by the change in ln Q, ln h and ln M in one step of Newton's method at a larger degree, and by
-    the decay of the coefficients: where these are barely resolved, the larger degree may be little better.
+    The error is estimated by the change in ln Q, ln h and ln M in one step of Newton's method at a larger degree, and
+    by the decay of the coefficients: where these are barely resolved, the larger degree may be little better.
     """
 
     def step(system: MappedSystem, z: Array) -> tuple[Array, Array, Array, Array]:
@@ -688,7 +690,9 @@ def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolut
     result = newton(lambda z: step(system, z)[:2], z, tolerance=1e-9, longest_step=1.0)
     z = result.z
     if not (result.converged and _is_physical(system, z)):
-        return MappedSolution(system, z, np.full(4, np.nan), np.inf, np.inf, Status.NO_CONVERGENCE, result.iterations)
+        return MappedSolution(
+            system, z, np.full(4, np.nan), np.inf, np.inf, SolverStatus.NO_CONVERGENCE, result.iterations
+        )
     macroscopic = system.macroscopic(z)
     larger, matrix = system.transferred(int(np.ceil(_CHECK * system.degree)), system.multiple)
     residual, jacobian, near, gradient = step(larger, matrix @ z)
@@ -700,9 +704,9 @@ def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolut
     a, b, _, _ = system.split(z)
     error = max(_SAFETY * (change + max(_decay(a), _decay(b))), _FLOOR)
     between = system.residual_between_nodes(z)
-    status = Status.CONVERGED
+    status = SolverStatus.CONVERGED
     if not (np.isfinite(error) and between < _SPURIOUS):
-        error, status = np.inf, Status.UNRESOLVED
+        error, status = np.inf, SolverStatus.UNRESOLVED
     return MappedSolution(system, z, macroscopic, error, between, status, result.iterations + 1)
 
 

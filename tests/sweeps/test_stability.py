@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import chuteflow
-from chuteflow.stability.verdict import stability_of
+from chuteflow.stability.result import stability_of
 from chuteflow.sweeps.engine import solve_chunk
-from chuteflow.sweeps.judged import JUDGED_KINDS
+from chuteflow.sweeps.stability import STABILITY_KINDS
 from chuteflow.sweeps.store import variables
 from chuteflow.sweeps.study import from_dict
 
@@ -31,14 +31,14 @@ def test_a_study_keeps_the_verdict_of_each_flow(temperature, stable):
     assert kept["mass_flux"] == pytest.approx(flow.mass_flux)
     assert kept["stable"] == found.stable == stable
     assert found.mode is not None
-    assert JUDGED_KINDS["mode"][kept["mode"]] == found.mode.direction
+    assert STABILITY_KINDS["mode"][kept["mode"]] == found.mode.direction
     assert (kept["growth"], kept["kx"], kept["ky"]) == pytest.approx((found.mode.growth, found.mode.kx, found.mode.ky))
     for name in ("stable", "mode"):
         assert solved.quantities[name][0].tolist() == [-1, -1]
     assert np.isnan(solved.quantities["growth"][0]).all()
 
 
-def test_what_cannot_be_judged_is_not_known_and_told_why():
+def test_the_reason_is_given_where_stability_is_not_known():
     given = {**STUDY, "parameters": {**STUDY["parameters"], "slope": 0.3, "surface": "interface"}}
     solved = solve_chunk(from_dict(given, Path()), 0)
     assert solved.n_flows.tolist() == [1]

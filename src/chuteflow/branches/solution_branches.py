@@ -12,15 +12,23 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.paths import Chord, Point, Turn, find_value, point_at, refined, turns
-from chuteflow.branches.ranges import BranchEnd, Range
+from chuteflow.branches.paths import (
+    Chord,
+    PathPoint,
+    TurningPoint,
+    find_value,
+    locate_turning_points,
+    refine_path,
+    solve_point,
+)
+from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Cells, Searched
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_M
 from chuteflow.steady.model import Model
 from chuteflow.steady.solver import TOLERANCE, Condition, Solution, resolve
-from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, carry_down
+from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid, integrate_trajectories
 
 #: Where a first or last rough flow leads nowhere, those so many places further are tried.
 _OTHERS = (0, 1, 2, 4, 8, 16)
@@ -29,14 +37,14 @@ _OTHERS = (0, 1, 2, 4, 8, 16)
 _TOO_NEAR, _SPACING, _TURNED = 0.015, 0.3, 0.95
 #: The same at larger hold-ups: there flows wind, and one between two others is a start only where these are near.
 _DEEP, _SPACING_DEEP = 5.0, 0.12
-#: Reaches over which the direction of a rough branch is looked for.
+#: Reaches over which the direction of a rough branch is searched for.
 _REACHES = (_TOO_NEAR, 0.06, 0.2, 0.5)
 #: No flow is solved where a rough branch turns by an angle of a smaller cosine within that distance: its direction
 #: there is not known.
 _SHARP = 0.8
 #: A solved flow lies within this of the rough one, and this fraction of the spacing.
 _ROUGH, _ASTRAY = 0.03, 0.3
-#: Where a rough quantity comes as near to the value asked for, the branch is solved there; and this part of the
+#: Where a rough quantity comes as near to the requested value, the branch is solved there; and this part of the
 #: spacing.
 NEAR, _PER_SPACING = 0.005, 0.15
 #: So near where the rough quantity turns, since a fold is not known as well; it turns where it is nearest to the value
@@ -46,9 +54,9 @@ _NEAR_TURN, _AROUND, _RISE = 0.08, 0.15, 0.01
 #: zero all along, its signs are not known well enough to join them.
 _SHORT, _BESIDE = 0.15, 0.15
 #: One flow is solved at once where the quantity changes along the branch by more than the first per length, over at
-#: least the second; and there by more than so many times of what the rough flow was wrong by.
+#: least the second; and there by more than this many times what the rough flow was wrong by.
 _STEEP, _OVER, _SURELY = 0.04, 0.1, 8.0
-#: Where the flows among rough ones are not found, they are looked for between rough ones so much further away.
+#: Where the flows among rough ones are not found, they are searched for between rough ones so much further away.
 _FURTHER = 0.1
 #: Where a quantity takes a value is found to this part of its change before it is solved for, where it fixes the flow:
 #: where it changes by more than the second along the branch, per length.
@@ -66,7 +74,7 @@ _REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class SolutionBranch:
     """A branch of flows in a range: rough flows in order, of which any are solved on request.
 
     ``macroscopic`` (k, 4) are the rough quantities, to about 1e-3. ``pieces`` are short branches near to this one which
@@ -75,7 +83,7 @@ class Family:
     """
 
     rough: RoughBranch
-    within: Range
+    within: SearchRange
     pieces: tuple[tuple[int, Array], ...] = ()
     separate: bool = True
 
@@ -109,7 +117,7 @@ class Family:
         m = self.macroscopic
         return float(np.linalg.norm(m[i] - 0.5 * (m[max(i - 1, 0)] + m[min(i + 1, len(m) - 1)])))
 
-    def solved(self, i: int, tolerance: float) -> Point | None:
+    def solved(self, i: int, tolerance: float) -> PathPoint | None:
         """The flow at rough flow ``i``: in the plane normal to the branch, or at the edge of the range. None where it
         is not found near there."""
         weights = self._direction(i)
@@ -122,16 +130,16 @@ class Family:
                 sign = 1.0 if weights[edge[0]] >= 0.0 else -1.0
                 weights = np.zeros(4)
                 weights[edge[0]], value = sign, sign * edge[1]
-        point = point_at(self.rough.start(i), weights, value, tolerance)
+        point = solve_point(self.rough.start(i), weights, value, tolerance)
         if point is None or np.linalg.norm(
             point.m - self.macroscopic[i]
         ) > _ROUGH + _ASTRAY * _SPACING_DEEP + self._bend(i):
             return None
         return point
 
-    def _solved_near(self, places: list[int], tolerance: float) -> list[Point]:
+    def _solved_near(self, places: list[int], tolerance: float) -> list[PathPoint]:
         """The flows at some rough ones in order, without those that lead nowhere."""
-        found: list[Point] = []
+        found: list[PathPoint] = []
         for i in places:
             # Where one rough flow leads nowhere its neighbour may.
             tries = (self.solved(k, tolerance) for k in (i, i + 1, i - 1) if 0 <= k < len(self.macroscopic))
@@ -140,7 +148,7 @@ class Family:
                 found.append(point)
         return found
 
-    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[Point]:
+    def points(self, begin: int, end: int, which: int, target: float, tolerance: float) -> list[PathPoint]:
         """Points from rough flow ``begin`` to ``end``, or from beyond, as many as it takes to know the branch between
         them. At the first and the last the quantity ``which`` is on the side of ``target`` on which the rough flow has
         it, and goes away from it beyond, so that a fold near to the target lies between; or they are ends of the
@@ -150,7 +158,7 @@ class Family:
             SolveError: where the branch could not be followed.
         """
 
-        def tried(places: list[int], outward: float) -> tuple[int, Point]:
+        def tried(places: list[int], outward: float) -> tuple[int, PathPoint]:
             """The first that is on its side, where the quantity goes away from the target outwards; or an end of the
             branch that is on the other side; or one that is on its side at least."""
             second = None
@@ -178,9 +186,9 @@ class Family:
         inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
-        return refined([first, *inner, last], tolerance)
+        return refine_path([first, *inner, last], tolerance)
 
-    def traced(self, tolerance: float) -> list[TracedFamily]:
+    def traced(self, tolerance: float) -> list[TracedBranch]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
         if len(inside) < 2:
@@ -190,10 +198,10 @@ class Family:
             while len(found) > 1 and _is_behind(found[0], found[-1]):
                 found.pop()
             found = [*found, found[0]] if len(found) > 2 else []
-        pieces: list[list[Point]] = [found[:1]]
+        pieces: list[list[PathPoint]] = [found[:1]]
         for one, other in pairwise(found):
             try:
-                pieces[-1] += refined([one, other], tolerance)[1:]
+                pieces[-1] += refine_path([one, other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
         ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
@@ -202,7 +210,7 @@ class Family:
         elif found:
             ends[0], ends[-1] = self.within.end_words(found[0].m), self.within.end_words(found[-1].m)
         return [
-            TracedFamily(tuple(piece), (begin, end))
+            TracedBranch(tuple(piece), (begin, end))
             for piece, begin, end in zip(pieces, ends[::2], ends[1::2], strict=True)
             if len(piece) > 1
         ]
@@ -227,9 +235,9 @@ class Family:
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def families(model: Model, within: Range) -> tuple[Family, ...]:
+def find_branches(model: Model, within: SearchRange) -> tuple[SolutionBranch, ...]:
     """Every branch of flows in the range, as far as the refinement of the search resolves them."""
-    found = [Family(branch, within) for branch in search(model, within).branches if len(branch) > 1]
+    found = [SolutionBranch(branch, within) for branch in search_range(model, within).branches if len(branch) > 1]
     pieces: list[list[tuple[int, Array]]] = [[] for _ in found]
     separate = [True] * len(found)
     for i, short in enumerate(found):
@@ -250,20 +258,22 @@ def families(model: Model, within: Range) -> tuple[Family, ...]:
     )
 
 
-def search(model: Model, within: Range) -> TrajectoryGrid:
+def search_range(model: Model, within: SearchRange) -> TrajectoryGrid:
     """The grid of trajectories over the range."""
-    return carry_down(model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux)
+    return integrate_trajectories(
+        model, within.coldest, within.hottest, within.deepest, largest_flux=within.largest_flux
+    )
 
 
-def searched(within: Range, grid: TrajectoryGrid) -> Searched:
-    """The range searched, and the cells that the search looked at."""
+def describe_search(within: SearchRange, grid: TrajectoryGrid) -> Searched:
+    """The range searched, and the cells that the search examined."""
     cells = Cells(grid.refinement.delta, grid.cells, len(grid.undecided))
     return Searched((within.coldest, within.hottest), min(within.deepest, grid.deepest), cells)
 
 
-def doubt(
+def explain_incompleteness(
     grid: TrajectoryGrid,
-    within: Range,
+    within: SearchRange,
     lost: list[Array],
     names: tuple[str, str],
     which: int = 0,
@@ -289,20 +299,20 @@ def _place(macroscopic: Array) -> str:
     return f"M = {mass:.4g} and T_surface = {temperature:.4g}"
 
 
-def crossings(
-    family: Family, which: int, value: float, tolerance: float = TOLERANCE
+def solve_crossings(
+    branch: SolutionBranch, which: int, value: float, tolerance: float = TOLERANCE
 ) -> tuple[list[Solution], list[Array]]:
     """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
     that were seen and could not be solved."""
     target = float(np.log(value))
-    m = family.macroscopic
+    m = branch.macroscopic
     off = m[:, which] - target
-    near = np.abs(off) < _doubt_of(off, family.arclength)
+    near = np.abs(off) < _doubt_of(off, branch.arclength)
     changes = np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0))
     near[changes] = near[changes + 1] = True
-    near[_turns_near(off, family.arclength)] = True
+    near[_turns_near(off, branch.arclength)] = True
     crossed: list[tuple[int, Array]] = []
-    for place, piece in family.pieces:
+    for place, piece in branch.pieces:
         there = piece[:, which] - target
         if np.abs(there).min() < _NEAR_TURN or (there >= 0.0).any() != (off[place] >= 0.0):
             near[place] = True
@@ -310,11 +320,11 @@ def crossings(
             crossed.append((place, piece))
     found: list[Solution] = []
     lost: list[Array] = []
-    for begin, end in _runs(near, family.arclength):
-        single = _solve_single(family, which, target, off, begin, end, tolerance)
-        solved = [single] if single is not None else _solve_among(family, which, target, begin, end, tolerance)
+    for begin, end in _runs(near, branch.arclength):
+        single = _solve_single(branch, which, target, off, begin, end, tolerance)
+        solved = [single] if single is not None else _solve_among(branch, which, target, begin, end, tolerance)
         if solved is None:
-            if family.separate:
+            if branch.separate:
                 lost += [m[i] for i in changes.tolist() if begin <= i < end]
             lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
         found += solved or []
@@ -350,7 +360,7 @@ def _turns_near(off: Array, arclength: Array) -> list[int]:
     return found
 
 
-def _is_behind(point: Point, last: Point) -> bool:
+def _is_behind(point: PathPoint, last: PathPoint) -> bool:
     """Whether a point is the last one, or so close that the roughness of the search put it behind."""
     step = point.m - last.m
     length = float(np.linalg.norm(step))
@@ -376,23 +386,23 @@ def _runs(marked: NDArray[np.bool_], arclength: Array) -> list[tuple[int, int]]:
 
 
 def _solve_single(
-    family: Family, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
+    branch: SolutionBranch, which: int, target: float, off: Array, begin: int, end: int, tolerance: float
 ) -> Solution | None:
     """The one flow among rough flows along which the quantity rises or falls steeply; None where it may turn."""
     change = np.flatnonzero((off[begin:end] >= 0.0) != (off[begin + 1 : end + 1] >= 0.0))
-    slopes = _slopes(off, family.arclength, begin, end)
+    slopes = _slopes(off, branch.arclength, begin, end)
     if len(change) != 1 or not (np.abs(slopes) > _STEEP).all() or not ((slopes > 0.0).all() or (slopes < 0.0).all()):
         return None
     i = begin + int(change[0])
     nearer = i if abs(off[i]) < abs(off[i + 1]) else i + 1
     weights = np.zeros(4)
     weights[which] = 1.0
-    point = point_at(family.rough.start(nearer), weights, target, tolerance)
+    point = solve_point(branch.rough.start(nearer), weights, target, tolerance)
     if point is None or abs(point.tangent[which]) < 0.5 * np.abs(slopes).min():
         return None
     fraction = off[i] / (off[i] - off[i + 1])
-    there = family.macroscopic[i] + fraction * (family.macroscopic[i + 1] - family.macroscopic[i])
-    spacing = family.arclength[i + 1] - family.arclength[i]
+    there = branch.macroscopic[i] + fraction * (branch.macroscopic[i + 1] - branch.macroscopic[i])
+    spacing = branch.arclength[i + 1] - branch.arclength[i]
     wrong = float(np.linalg.norm(point.m - there))
     sure = wrong < _ROUGH + _ASTRAY * spacing and np.abs(slopes).min() * max(_OVER, spacing) > _SURELY * abs(
         float((point.m - there)[which] - point.tangent[which] * ((point.m - there) @ point.tangent))
@@ -409,14 +419,14 @@ def _slopes(off: Array, arclength: Array, begin: int, end: int) -> Array:
 
 
 def _solve_among(
-    family: Family, which: int, target: float, begin: int, end: int, tolerance: float
+    branch: SolutionBranch, which: int, target: float, begin: int, end: int, tolerance: float
 ) -> list[Solution] | None:
     """The flows among rough ones, by solving the branch between them: its turning points part it into monotonic
     pieces. None where they are not found."""
-    length = family.arclength
+    length = branch.arclength
     for _ in range(2):
         try:
-            points = family.points(begin, end, which, target, tolerance)
+            points = branch.points(begin, end, which, target, tolerance)
             return _on_path(points, which, target, tolerance)
         except SolveError:
             begin = max(int(np.searchsorted(length, length[begin] - _FURTHER)) - 1, 0)
@@ -424,10 +434,10 @@ def _solve_among(
     return None
 
 
-def _on_path(points: list[Point], which: int, target: float, tolerance: float) -> list[Solution]:
+def _on_path(points: list[PathPoint], which: int, target: float, tolerance: float) -> list[Solution]:
     """The flows on a path of solved points at which a quantity takes a value."""
     placed = [(float(i), point) for i, point in enumerate(points)]
-    turning = turns(points, which, tolerance)
+    turning = locate_turning_points(points, which, tolerance)
     placed += [(turn.place, turn.point) for turn in turning]
     placed.sort(key=lambda pair: pair[0])
     along = [point for _, point in placed]
@@ -455,7 +465,7 @@ def _on_path(points: list[Point], which: int, target: float, tolerance: float) -
     return found
 
 
-def _level(along: list[Point], off: Array) -> list[tuple[int, int]]:
+def _level(along: list[PathPoint], off: Array) -> list[tuple[int, int]]:
     """The first and last points of the pieces on which a quantity, given how far it is ``off`` its value, is at that
     value to the error of the flows at more than one point."""
     at_value = np.abs(off) <= max(point.solution.error for point in along)
@@ -468,7 +478,7 @@ def _level(along: list[Point], off: Array) -> list[tuple[int, int]]:
 
 
 def _at_fold(near: Solution) -> Solution:
-    """A flow at a fold in the quantity asked for: there the others are known to the root of the error."""
+    """A flow at a fold in the requested quantity: there the others are known to the root of the error."""
     return Solution(near.macroscopic, float(np.sqrt(near.error)), near.status, near.source, near.rates)
 
 
@@ -488,13 +498,13 @@ def _between(chord: Chord, which: int, target: float) -> Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class TracedFamily:
+class TracedBranch:
     """A branch as far as it goes within a range: solved ``points`` in order, which suffice to know it between them.
 
     ``ends`` says in words why it ends at either side; a loop ends with its first flow.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[PathPoint, ...]
     ends: tuple[str, str]
 
     @property
@@ -512,11 +522,11 @@ class TracedFamily:
         """In the space of the macroscopic quantities from the first flow, by chords, (k,)."""
         return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.macroscopic, axis=0), axis=1)))
 
-    def turns(self, which: int, tolerance: float) -> list[Turn]:
+    def turns(self, which: int, tolerance: float) -> list[TurningPoint]:
         """The points at which a quantity turns."""
-        return turns(self.points, which, tolerance)
+        return locate_turning_points(self.points, which, tolerance)
 
-    def at(self, places: Array, tolerance: float) -> list[Point]:
+    def at(self, places: Array, tolerance: float) -> list[PathPoint]:
         """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
         out = []
@@ -531,19 +541,19 @@ class TracedFamily:
         return out
 
 
-def traced_families(model: Model, within: Range, tolerance: float = 1e-8) -> list[TracedFamily]:
+def trace_branches(model: Model, within: SearchRange, tolerance: float = 1e-8) -> list[TracedBranch]:
     """Every branch of flows in the range, solved from end to end."""
     return trace_all(model, within, tolerance)[0]
 
 
-def trace_all(model: Model, within: Range, tolerance: float) -> tuple[list[TracedFamily], list[Array]]:
+def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list[TracedBranch], list[Array]]:
     """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
-    found: list[TracedFamily] = []
+    found: list[TracedBranch] = []
     lost: list[Array] = []
-    for family in families(model, within):
-        pieces = family.traced(tolerance)
+    for branch in find_branches(model, within):
+        pieces = branch.traced(tolerance)
         found += pieces
-        inside = [m for m in family.macroscopic if within.contains(m)]
-        if len(inside) > 1 and not pieces and family.separate:
+        inside = [m for m in branch.macroscopic if within.contains(m)]
+        if len(inside) > 1 and not pieces and branch.separate:
             lost.append(inside[len(inside) // 2])
     return found, lost

@@ -5,9 +5,9 @@ import pytest
 
 import chuteflow
 from chuteflow import Chute, stability_of
-from chuteflow.stability import search, verdict
+from chuteflow.stability import result, search
 from chuteflow.stability.modes import Disturbances, UnresolvedError
-from chuteflow.stability.verdict import growth_map, leading, leading_modes, wavenumbers
+from chuteflow.stability.result import growth_map, leading, leading_modes, wavenumbers
 
 from .population import random_flows, seen_again
 
@@ -43,7 +43,7 @@ def test_the_fastest_growing_mode_of_the_three_flows_of_the_paper(three, name, d
 
 
 def test_long_waves_are_followed_to_their_own_summit():
-    # Rates of other modes lie close by: a mode lost on the way would end beside the summit.
+    # Rates of other modes lie close by: a mode lost on the way would end beside the maximum.
     (flow,) = chuteflow.flows(Chute(0.4, 0.9, 0.6, 0.8), Q=3.0)
     _, mode = mode_of(flow, ky=0.0)
     for kx in (5e-5, 8e-5, 1.2e-4, 1.5e-4, 2e-4, 5e-4):
@@ -107,7 +107,7 @@ def never_told(where):
 
 
 def test_an_unresolved_wave_is_told_and_raises_nothing(three, monkeypatch):
-    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: True))
+    monkeypatch.setattr(result, "leading", never_told(lambda kx, ky: True))
     found = stability_of(three["A"], kx=0.01, ky=0.02)
     assert (found.stable, found.mode, found.grows) == (None, None, False)
     assert found.unresolved == ((0.01, 0.02),)
@@ -121,7 +121,7 @@ def test_a_flow_with_unresolved_wavenumbers_is_not_called_stable_but_unstable_if
     assert found.complete
     assert found.unresolved == ((0.0, 0.0),)
     steep = chuteflow.flows(Chute(0.568, 0.627, 0.478, 0.847), T_surface=9.5)[0]
-    # The summit itself is unresolved: its mode is known all the same, by itself.
+    # The maximum itself is unresolved: its mode is known all the same, by itself.
     monkeypatch.setattr(search, "leading", never_told(lambda kx, ky: 0.03 < ky < 0.06))
     found = stability_of(steep)
     assert found.stable is False
@@ -149,7 +149,7 @@ def test_a_map_holds_the_leading_modes(three):
 
 
 def test_a_map_goes_on_where_the_grids_do_not_tell(three, monkeypatch):
-    monkeypatch.setattr(verdict, "leading", never_told(lambda kx, ky: kx == 0.0))
+    monkeypatch.setattr(result, "leading", never_told(lambda kx, ky: kx == 0.0))
     found = growth_map(Disturbances(three["C"]), np.array([0.0, 0.01]), np.array([0.0, 0.01]))
     assert found.unresolved.tolist() == [[True, True], [False, False]]
     assert np.isnan(found.growth[0]).all()

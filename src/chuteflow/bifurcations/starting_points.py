@@ -1,11 +1,11 @@
-"""Where boundaries are entered: their points on the families of flows at one value of the second parameter.
+"""Where boundaries are entered: their points on the branches of flows at one value of the second parameter.
 
-# notation: sigma runs from 0 to 1 along the chord between two successive flows of a family in the plane
+# notation: sigma runs from 0 to 1 along the chord between two successive flows of a branch in the plane
 # (ln M, ln T_surface).
 
-A boundary that begins and ends between two values, as the two folds that are born at a cusp, has no point at
+A boundary that begins and ends between two values, as the two folds that begin at a cusp, has no point at
 either. It announces itself: near the cusp the quantity that folds has a place where it almost turns. From there, and
-from the ends of families, the parameter is moved until the condition holds.
+from the ends of branches, the parameter is moved until the condition holds.
 """
 
 from __future__ import annotations
@@ -16,46 +16,45 @@ from itertools import pairwise
 
 import numpy as np
 
-from chuteflow.bifurcations.conditions import Condition, Fold, InteriorChange, Inversion, Local
-from chuteflow.bifurcations.points import BoundaryPoint, shift, solved, through
-from chuteflow.bifurcations.system import BoundarySystem, Sweep
-from chuteflow.branches.families import TracedFamily, traced_families
+from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, Linearisation, TestFunction
+from chuteflow.bifurcations.points import BoundaryPoint, estimate_shift, solve_across, solve_boundary_point
+from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.paths import solve_between
-from chuteflow.branches.ranges import Range
+from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.solution_branches import TracedBranch, trace_branches
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.newton import solve_each
-from chuteflow.numerics.roots import bisected
+from chuteflow.numerics.roots import bisect
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T, WHOLE, Collocation
 from chuteflow.steady.model import LOSS, WORK, model
-from chuteflow.steady.solver import Condition as SolverCondition
-from chuteflow.steady.solver import Solution, resolve
+from chuteflow.steady.solver import Condition, Solution, resolve
 
 #: The kinds of boundaries, and the quantities whose folds they are.
 FOLDS = {"fold-Q": LOG_Q, "fold-M": LOG_M, "fold-T": LOG_T}
 KINDS = (*FOLDS, "density-inversion", "interior-change")
 #: The row that holds the parameter.
 HELD = np.array([0.0, 0.0, 1.0])
-#: A point is looked for this far beyond a chord, and found within so many of its lengths beside it.
+#: A point is searched for this far beyond a chord, and found within so many of its lengths beside it.
 _BEYOND, _BESIDE = 0.02, 1.0
 #: How often a stretch is halved where the point that it must hold is not found.
 _HALVINGS = 6
-#: A boundary beside the families is looked for as far as so many times the distance to go to it.
+#: A boundary beside the branches is searched for as far as so many times the distance to go to it.
 _FARTHER = 1.5
-#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
-#: tolerance, and ends where so small a share is left.
-_STRIDE, _WALK, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
+#: A step towards it covers at most this fraction of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a fraction is left.
+_STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: A condition that no flow enters is met at values of the parameter known to this.
 _CLOSE = 1e-14
 #: Net loss below this is none.
 _NONE = 1e-10
-#: Range of ln x over which the least is looked for, samples of it, and how often it is zoomed in.
+#: Range of ln x over which the least is searched for, samples of it, and how often it is zoomed in.
 _LOG_X, _SAMPLES, _ZOOMS = (-20.0, 30.0), 200, 6
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
-    """A flow of a family, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
+class _SampledFlow:
+    """A flow of a branch, with the condition's function of it: ``value``, and ``gradient`` (n+3,) and that of the
     plane (ln M, ln T_surface), (2, n+3), and the Jacobian of the steady problem."""
 
     solution: Solution
@@ -72,27 +71,27 @@ class _Sample:
         return float(self.gradient @ solve_each(matrix, side))
 
 
-def conditions(kind: str) -> Sequence[Condition]:
+def make_test_functions(kind: str) -> Sequence[TestFunction]:
     """The conditions of a kind of boundary."""
     if kind in FOLDS:
         return [Fold(FOLDS[kind])]
     return [Inversion()] if kind == "density-inversion" else [InteriorChange(False), InteriorChange(True)]
 
 
-def on_families(
-    sweep: Sweep,
-    condition: Condition,
+def find_on_branches(
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
-    families: Sequence[TracedFamily],
+    branches: Sequence[TracedBranch],
     reach: float,
     tolerance: float,
 ) -> Iterator[BoundaryPoint]:
-    """Every point of the boundary on families of flows at one value of the parameter, and points beside them, as
-    far as ``reach`` in the parameter, where a family comes near to the condition and does not meet it."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+    """Every point of the boundary on branches of flows at one value of the parameter, and points beside them, as
+    far as ``reach`` in the parameter, where a branch comes near to the condition and does not meet it."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
         if isinstance(condition, Fold):
-            for turn in family.turns(condition.which, tolerance):
+            for turn in branch.turns(condition.which, tolerance):
                 if turn.point.solution.problem.breaks == WHOLE:
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
@@ -103,27 +102,29 @@ def on_families(
                 yield point
 
 
-def _in_one_piece(family: TracedFamily) -> list[Solution]:
-    """The flows of a family that one grid resolves: boundaries are followed on such."""
-    return [solution for solution in family.solutions if solution.problem.breaks == WHOLE]
+def _in_one_piece(branch: TracedBranch) -> list[Solution]:
+    """The flows of a branch that one grid resolves: boundaries are followed on such."""
+    return [solution for solution in branch.solutions if solution.problem.breaks == WHOLE]
 
 
-def families_at(sweep: Sweep, value: float, within: Range) -> list[TracedFamily]:
-    """Every family of flows in a range at one value of the parameter."""
-    return traced_families(model(sweep.chute_at(value)), within)
+def trace_branches_at(sweep: SecondParameter, value: float, within: SearchRange) -> list[TracedBranch]:
+    """Every branch of flows in a range at one value of the parameter."""
+    return trace_branches(model(sweep.chute_at(value)), within)
 
 
-def _from_flow(sweep: Sweep, condition: Condition, value: float, solution: Solution, tolerance: float) -> BoundaryPoint:
+def _from_flow(
+    sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution, tolerance: float
+) -> BoundaryPoint:
     """The point of the boundary at a value of the parameter, from its flow."""
     w = np.append(solution.z, value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-    return solved(system, w, HELD, value, tolerance)
+    return solve_boundary_point(system, w, HELD, value, tolerance)
 
 
 def _zeros(
-    sweep: Sweep, condition: Condition, value: float, samples: Sequence[_Sample], tolerance: float
+    sweep: SecondParameter, condition: TestFunction, value: float, samples: Sequence[_SampledFlow], tolerance: float
 ) -> list[BoundaryPoint]:
-    """The points along a family where the condition's function vanishes."""
+    """The points along a branch where the condition's function vanishes."""
     found: list[BoundaryPoint] = []
     for first, last in pairwise(samples):
         for point in _between(sweep, condition, value, first, last, tolerance, _HALVINGS):
@@ -133,7 +134,13 @@ def _zeros(
 
 
 def _between(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, tolerance: float, halvings: int
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    tolerance: float,
+    halvings: int,
 ) -> Iterator[BoundaryPoint]:
     """The points between two flows: as the cubic through both says, or those in both halves."""
     chord = (last.solution.macroscopic - first.solution.macroscopic)[LOG_M:]
@@ -166,18 +173,24 @@ def _places(f0: float, f1: float, d0: float, d1: float) -> list[float]:
 
 
 def _near(
-    sweep: Sweep, condition: Condition, value: float, first: _Sample, last: _Sample, sigma: float, tolerance: float
+    sweep: SecondParameter,
+    condition: TestFunction,
+    value: float,
+    first: _SampledFlow,
+    last: _SampledFlow,
+    sigma: float,
+    tolerance: float,
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -s.problem.degree)
-    share = 1.0 - sigma if one is last.solution else sigma
+    fraction = 1.0 - sigma if one is last.solution else sigma
     problem = one.problem
     _, matrix = other.problem.transferred(problem.degree, problem.stretch)
     moved = np.concatenate([matrix @ other.z[:-2], other.z[-2:]])
-    w = np.append(one.z + share * (moved - one.z), value)
+    w = np.append(one.z + fraction * (moved - one.z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
-        point = solved(system, w, HELD, value, tolerance)
+        point = solve_boundary_point(system, w, HELD, value, tolerance)
     except SolveError:
         return None
     ends = np.array([s.solution.macroscopic[LOG_M:] for s in (first, last)])
@@ -190,8 +203,8 @@ def _near(
     return point if inside and beside <= _BESIDE * length else None
 
 
-def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple[int, Array]]:
-    """Indices of the flows that come nearest to the condition, or end the family on the way to it, with a chord."""
+def _nearest(samples: Sequence[_SampledFlow], condition: TestFunction) -> Iterator[tuple[int, Array]]:
+    """Indices of the flows that come nearest to the condition, or end the branch on the way to it, with a chord."""
     plane = np.array([sample.solution.macroscopic[LOG_M:] for sample in samples])
     chords = np.diff(plane, axis=0)
     if len(samples) < 3 or not chords.any(axis=1).all():
@@ -209,22 +222,22 @@ def _nearest(samples: Sequence[_Sample], condition: Condition) -> Iterator[tuple
 
 
 def _beside(
-    sweep: Sweep,
-    condition: Condition,
+    sweep: SecondParameter,
+    condition: TestFunction,
     value: float,
     solution: Solution,
     chord: Array,
     reach: float,
     tolerance: float,
 ) -> BoundaryPoint | None:
-    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its family."""
+    """The point of the boundary that a flow comes to as the parameter moves, held in the plane across its branch."""
     row = np.array([chord[1], chord[0], 0.0])
-    plane = SolverCondition.plane(chord, solution.macroscopic)
+    plane = Condition.plane(chord, solution.macroscopic)
     at = value
-    for _ in range(_WALK):
+    for _ in range(_MOST_STEPS):
         w = np.append(solution.z, at)
         system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-        ahead = at + shift(system, w, row)
+        ahead = at + estimate_shift(system, w, row)
         if not (abs(ahead - value) <= reach and sweep.allows(ahead)):
             return None
         if abs(ahead - at) <= _ARRIVED * reach:
@@ -237,7 +250,7 @@ def _beside(
     else:
         return None
     try:
-        point = solved(system, w, row, float(row @ w[-3:]), tolerance)
+        point = solve_boundary_point(system, w, row, float(row @ w[-3:]), tolerance)
     except SolveError:
         return None
     near = abs(point.value - value) <= _FARTHER * reach and sweep.low <= point.value <= sweep.high
@@ -249,16 +262,16 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
     return bool(np.abs(gap).max() < 1e-7)
 
 
-def _sample(sweep: Sweep, condition: Condition, value: float, solution: Solution) -> _Sample:
+def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution) -> _SampledFlow:
     here, beyond = sweep.models(value)
     degree, stretch = solution.problem.degree, solution.problem.stretch
-    at = Local.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
-    f, gradient = condition.along_family(at)
-    return _Sample(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
+    at = Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), solution.z)
+    f, gradient = condition.along_branch(at)
+    return _SampledFlow(solution, f, gradient, at.state.macroscopic_gradient()[LOG_M:], at.by_z)
 
 
-def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: float) -> list[float]:
-    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole families.
+def find_values_for_all_flows(sweep: SecondParameter, condition: TestFunction, low: float, high: float) -> list[float]:
+    """Values of the parameter between ``low`` and ``high`` at which the condition may hold along whole branches.
 
     On the half-line dissipation and production balance at the surface, or at the density where they come nearest
     to it, in all flows of a chute that have that density or in none.
@@ -270,33 +283,33 @@ def whatever_the_flow(sweep: Sweep, condition: Condition, low: float, high: floa
         ends = balance(sweep, low), balance(sweep, high)
         if (ends[0] > 0.0) != (ends[1] > 0.0):
             sign = 1.0 if ends[1] > 0.0 else -1.0
-            out.append(bisected(lambda value, sign=sign, of=balance: sign * of(sweep, value), low, high, _CLOSE))
+            out.append(bisect(lambda value, sign=sign, of=balance: sign * of(sweep, value), low, high, _CLOSE))
     return out
 
 
-def along_families(
-    sweep: Sweep, condition: Condition, value: float, families: Sequence[TracedFamily], tolerance: float
+def find_along_branches(
+    sweep: SecondParameter, condition: TestFunction, value: float, branches: Sequence[TracedBranch], tolerance: float
 ) -> Iterator[BoundaryPoint]:
-    """One point of each stretch of the families of flows at a value of the parameter that is boundary throughout."""
-    for family in families:
-        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(family)]
+    """One point of each stretch of the branches of flows at a value of the parameter that is boundary throughout."""
+    for branch in branches:
+        samples = [_sample(sweep, condition, value, solution) for solution in _in_one_piece(branch)]
         met = np.array([abs(sample.value) < _NONE for sample in samples])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], met, [False]]).astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             solution = samples[(begin + end) // 2].solution
             w = np.append(solution.z, value)
             system = BoundarySystem(sweep, condition, 0, 0.0).moved(solution.problem, w)
-            yield through(system, w, tolerance)
+            yield solve_across(system, w, tolerance)
 
 
-def _at_surface(sweep: Sweep, value: float) -> float:
+def _at_surface(sweep: SecondParameter, value: float) -> float:
     """Net loss at the surface of the half-line."""
     here, _ = sweep.models(value)
     f, _ = here.closures(np.zeros(1))
     return float(f[LOSS, 0] - here.slope**2 * f[WORK, 0])
 
 
-def _least(sweep: Sweep, value: float) -> float:
+def _least(sweep: SecondParameter, value: float) -> float:
     """The least net loss at any density."""
     here, _ = sweep.models(value)
     (low, high), least = _LOG_X, np.inf

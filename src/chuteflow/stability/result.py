@@ -2,7 +2,7 @@
 
 # notation: k = |(kx, ky)| wavenumber, h centre of mass.
 
-A verdict is given only after the whole range of wavenumbers was searched, see :mod:`chuteflow.stability.search`.
+Stability is decided only after the whole range of wavenumbers was searched, see :mod:`chuteflow.stability.search`.
 What was asked of single wavenumbers says what these waves do, and no more.
 """
 
@@ -24,7 +24,7 @@ from chuteflow.stability.modes import (
     check_wavenumbers,
     leading,
 )
-from chuteflow.stability.search import Fastest, fastest
+from chuteflow.stability.search import FastestMode, find_fastest
 from chuteflow.steady.flow import Flow
 from chuteflow.threads import on_one_thread
 
@@ -45,12 +45,12 @@ RANGE, _SHORTEST = (1e-3, 10.0), np.pi
 
 @dataclass(frozen=True, eq=False)
 class Stability(Result):
-    """Whether ``flow`` is stable, and its ``mode`` of largest growth among those that were looked at.
+    """Whether ``flow`` is stable, and its ``mode`` of largest growth among those that were examined.
 
     ``stable`` is True or False only if ``complete``: if all directions and all k in ``searched`` (1/d) were searched,
     and disturbances that are the same all along the chute. It is True if no discrete mode of them grows faster than
     ``smallest_rate``, False if one does, and None if none is known to and some are ``unresolved``: wavenumbers
-    (kx, ky) at which the grids do not tell. If wavenumbers were given, ``stable`` is None and ``grows`` says what
+    (kx, ky) at which the grids do not resolve it. If wavenumbers were given, ``stable`` is None and ``grows`` says what
     the wave does. The mass mode at k = 0, which leads to the neighbouring steady flow, is set apart. ``mode`` is None
     where the continuous spectrum, which decays, hides all modes, and where nothing is told. ``examined`` counts the
     wavenumbers of the scan, from whose peaks the maxima are sought.
@@ -77,16 +77,16 @@ class Stability(Result):
         return not self.grows
 
     def __repr__(self) -> str:
-        verdict = "not known" if self.stable is None else "stable" if self.stable else "unstable"
-        return display.line("Stability", verdict, None if self.mode is None else repr(self.mode)[1:-1])
+        known = "not known" if self.stable is None else "stable" if self.stable else "unstable"
+        return display.line("Stability", known, None if self.mode is None else repr(self.mode)[1:-1])
 
     def _repr_html_(self) -> str:
         mode = self.mode
         header = ["", "mode", "kx", "ky", "growth", "frequency", "error"]
         numbers = [] if mode is None else [mode.kx, mode.ky, mode.growth, mode.frequency, mode.error]
         cells = ["none"] if mode is None else [mode.kind, *map(display.number, numbers)]
-        verdict = repr(self)[1:-1].split(": ")[1].split("; ")[0]
-        return display.html_table(f"Stability of {self.flow.name}", header, [[verdict, *cells]])
+        known = repr(self)[1:-1].split(": ")[1].split("; ")[0]
+        return display.html_table(f"Stability of {self.flow.name}", header, [[known, *cells]])
 
 
 @on_one_thread
@@ -110,7 +110,7 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
         k = float(np.hypot(kx, ky))
         searched, found = (k, k), _single(disturbances, kx, ky)
     else:
-        found = fastest(disturbances, searched, kx, ky)
+        found = find_fastest(disturbances, searched, kx, ky)
     return Stability(
         flow=flow,
         mode=found.mode,
@@ -122,13 +122,13 @@ def stability_of(flow: Flow, *, kx: float | None = None, ky: float | None = None
     )
 
 
-def _single(disturbances: Disturbances, kx: float, ky: float) -> Fastest:
+def _single(disturbances: Disturbances, kx: float, ky: float) -> FastestMode:
     try:
         found = leading(disturbances, kx, ky, count=2, tolerance=TOLERANCE)
     except UnresolvedError:
-        return Fastest(None, ((kx, ky),), 1)
+        return FastestMode(None, ((kx, ky),), 1)
     # At k = 0 the mass mode says nothing of stability.
-    return Fastest(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
+    return FastestMode(next((mode for mode in found if mode.kind != "mass"), None), (), 1)
 
 
 def wavenumbers(flow: Flow) -> tuple[float, float]:
@@ -140,11 +140,11 @@ def wavenumbers(flow: Flow) -> tuple[float, float]:
 @on_one_thread
 @np.errstate(under="ignore")
 def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[Mode]:
-    """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if it can be had.
+    """Up to ``count`` modes at these wavenumbers, fastest growing first, the first to six digits if possible.
 
     Raises:
         InputError: for wavenumbers out of range, and where stability cannot be posed.
-        SolveError: where an eigenvalue that seems to grow cannot be told on the finest grids.
+        SolveError: where an eigenvalue that seems to grow cannot be decided on the finest grids.
     """
     check_wavenumbers(kx, ky)
     return leading(Disturbances(flow), kx, ky, count=count, tolerance=TOLERANCE)
@@ -154,8 +154,8 @@ def leading_modes(flow: Flow, kx: float, ky: float, *, count: int = 1) -> list[M
 class GrowthMap:
     """Growth rates, frequencies and errors of the leading modes over ``kx`` (m,) and ``ky`` (n,), arrays (m, n).
 
-    They are NaN where no mode is told from the continuous spectrum, which decays, and where ``unresolved`` (m, n):
-    there the grids do not tell whether something grows.
+    They are NaN where no mode is distinguished from the continuous spectrum, which decays, and where ``unresolved`` (m,
+    n): there the grids do not resolve whether a disturbance grows.
     """
 
     flow: Flow

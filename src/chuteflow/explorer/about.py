@@ -1,0 +1,33 @@
+"""What the page is told before it asks anything: what can be set, cases, and what quantities are called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from chuteflow import __version__
+from chuteflow.explorer import queries
+from chuteflow.steady.quantities import QUANTITIES
+from chuteflow.steady.validity import WORDS
+
+
+def about(data: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """Controls, cases, words and quantities, as JSON has them, with ``data``, what was measured."""
+    return {
+        "version": __version__,
+        "data": list(data),
+        "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
+        "presets": [asdict(preset) for preset in queries.PRESETS],
+        "cases": [asdict(case) for case in queries.cases()],
+        "validity": WORDS,
+        "choices": {name: asdict(choice) for name, choice in queries.CHOICES.items()},
+        "quantities": {
+            quantity.symbol: {
+                "description": quantity.description,
+                "unit": quantity.unit,
+                "dimension": quantity.dimension,
+            }
+            for quantity in QUANTITIES.values()
+        },
+    }
