@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from chuteflow.dem import averages
-from chuteflow.dem.averages import Sums, fields_of, jackknife, pair_contacts, plane_contacts, sums_of, tenths_of
+from chuteflow.dem.averages import Sums, fields_of, pair_contacts, plane_contacts, sums_of, tenths_of, with_errors
 from chuteflow.dem.contacts import MASS, PAIR_MASS
+from chuteflow.dem.correlation import correlation_time, long_run_variance
 from chuteflow.dem.output import Frame, Layers
 from chuteflow.dem.script import BIN, MOMENTS
 from chuteflow.dem.steadiness import Drift, drift, verdict
@@ -134,19 +135,52 @@ def test_tenths_of_a_shear_flow_are_its_functions():
     assert (np.diff(tenths["volume_fraction"]) > 0.0).all()
 
 
-def test_the_jackknife_of_a_mean_is_its_standard_error():
-    values = np.random.default_rng(1).normal(5.0, 2.0, 12)
-    sums = stratified(lambda z: np.exp(-z), lambda z: z, lambda z: 1.0 + 0.0 * z, blocks=12)
-    sums = Sums(**{**vars(sums), "base_loss": values})
-    mean, error = jackknife(sums, lambda one: {"loss": one.base_loss[0]})
+def with_losses(values):
+    """Sums of blocks that differ in the loss at the base."""
+    sums = stratified(lambda z: np.exp(-z), lambda z: z, lambda z: 1.0 + 0.0 * z, blocks=len(values))
+    return Sums(**{**vars(sums), "base_loss": np.array(values)})
+
+
+def test_the_error_of_a_mean_of_independent_blocks_is_its_standard_error():
+    values = np.random.default_rng(1).normal(5.0, 2.0, 400)
+    mean, error = with_errors(
+        with_losses(values), lambda one: {"loss": one.base_loss[0], "square": one.base_loss[0] ** 2}
+    )
     assert mean["loss"] == pytest.approx(values.mean())
-    assert error["loss"] == pytest.approx(values.std(ddof=1) / math.sqrt(12))
+    assert error["loss"] == pytest.approx(2.0 / 20.0, rel=0.15)
+    assert error["square"] == pytest.approx(2.0 * values.mean() * error["loss"], rel=1e-3)
 
 
-def test_grouped_blocks_have_the_same_mean_and_lose_the_first_that_are_left_over():
-    sums = stratified(lambda z: np.exp(-z), lambda z: z, lambda z: 1.0 + 0.0 * z, blocks=7)
-    sums = Sums(**{**vars(sums), "base_loss": np.arange(7.0)})
-    np.testing.assert_allclose(sums.grouped(3).base_loss, [1.5, 3.5, 5.5])
+def memory(count, decay, series, seed):
+    """Series (count, series) of variance 1 whose values are forgotten as exp(-t/decay)."""
+    random = np.random.default_rng(seed)
+    kept = math.exp(-1.0 / decay)
+    values = [random.normal(size=series)]
+    for _ in range(count - 1):
+        values.append(kept * values[-1] + math.sqrt(1.0 - kept**2) * random.normal(size=series))
+    return np.array(values)
+
+
+@pytest.mark.parametrize(("decay", "blocks"), [(0.1, 90), (4.0, 90), (4.0, 360), (8.0, 360)])
+def test_errors_count_the_correlation_of_blocks(decay, blocks):
+    values = memory(blocks, decay, 400, 7)
+    mean = values.mean(axis=0)
+    error = np.sqrt(long_run_variance(values - mean) / blocks)
+    # Means of independent series scatter as their errors say; of ten blocks without correlation they do by 1.4 to 2.
+    assert 0.9 < math.sqrt(((mean / error) ** 2).mean()) < 1.3
+
+
+@pytest.mark.parametrize("decay", [0.1, 40.0])
+def test_errors_of_drifts_count_the_correlation(decay):
+    times = np.arange(1800.0)
+    found = [drift(times, 10.0 + values) for values in memory(1800, decay, 100, 3).T]
+    assert 0.8 < math.sqrt(np.mean([(one.value / one.error) ** 2 for one in found])) < 1.35
+
+
+def test_the_correlation_time_is_that_of_the_memory():
+    assert correlation_time(memory(40_000, 20.0, 1, 1)[:, 0]) == pytest.approx(20.0, rel=0.25)
+    assert correlation_time(np.random.default_rng(1).normal(size=10_000)) == pytest.approx(0.5, rel=0.1)
+    assert correlation_time(np.ones(10)) == 0.5
 
 
 @pytest.mark.parametrize(

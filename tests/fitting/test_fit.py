@@ -97,6 +97,22 @@ def test_the_jacobian_is_that_of_differences(flow, exact, relative):
         np.testing.assert_allclose(linear.by_place, change, atol=1e-5 * np.abs(change).max())
 
 
+#: Thin flows whose best fit is at e = 1, one whose intervals were far too narrow and one with an open e; and a dense
+#: flow that is like none of the trial chutes which are tried first.
+DIFFICULT = {"narrow": 44, "open": 17, "dense": 23}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", DIFFICULT.values(), ids=DIFFICULT)
+def test_intervals_of_difficult_flows_hold_the_truth(seed):
+    one = trial(seed, "lun")
+    assert one.covered == (True, True, True)
+    assert one.right
+    if seed == DIFFICULT["narrow"]:
+        # chi2 along the valley rises by the 3.84 of the confidence near e = 0.34 alone.
+        assert 0.25 < one.found.estimates[0].interval.low < 0.45
+
+
 @pytest.mark.slow
 def test_an_unknown_base_is_found(flow):
     z = np.linspace(0.1, 0.8, 9) * flow.depth
@@ -309,12 +325,13 @@ def test_posterior_intervals_are_near_those_of_the_likelihood(noisy):
 
 
 @pytest.mark.slow
-def test_fits_take_seconds(flow):
+def test_fits_take_seconds():
     # Processor time: the machine may be busy.
-    data = measured(flow, np.random.default_rng(3))
-    start = time.process_time()
-    fit(data, FIRST, FREE)
-    assert time.process_time() - start < 2.0
+    for one in flows(TRUE, Q=3.0):
+        data = measured(one, np.random.default_rng(3))
+        start = time.process_time()
+        fit(data, FIRST, FREE)
+        assert time.process_time() - start < 2.0
     rng = np.random.default_rng(11)
     true = Chute(0.3, 0.85, 0.75, 0.62, closure="lun:friction=0.05")
     parts = []

@@ -15,6 +15,8 @@ from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE, Parameter
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
     from chuteflow.branches.results import Curve, FlowSet
@@ -281,6 +283,8 @@ def _parameter_options(
 
 #: The parameters of a chute alone.
 parameter_options = _parameter_options(Number(), "or give --angle", "", lambda parameter: f", {parameter.allowed}")
+#: Those where no law and no base of the theory is asked for, and numbers are dimensionless.
+grain_options = _options(_described, case_options, parameter_options)
 #: All that says which chute, with or without SI units.
 chute_options = _options(_described, case_options, parameter_options, _model_options, scale_options)
 
@@ -352,6 +356,22 @@ def picture_files(path: str) -> list[str]:
     if several is None:
         return [path]
     return [f"{several[1]}.{ending}" for ending in dict.fromkeys(several[2].split(","))]
+
+
+def directory(name: str) -> Path:
+    """The directory of a name, made if need be.
+
+    Raises:
+        InputError: where it cannot be made.
+    """
+    from pathlib import Path
+
+    folder = Path(name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
+    return folder
 
 
 def chute(given: Mapping[str, Any]) -> Chute:

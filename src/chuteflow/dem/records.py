@@ -91,7 +91,7 @@ def _dataset(measured: Measured, history: str) -> Dataset:
         "source": f"chuteflow {__version__}",
         "history": history,
         "references": PAPER,
-        "comment": f"{numbers_are(None)}; standard errors are those of the jackknife over blocks of time",
+        "comment": f"{numbers_are(None)}; standard errors count the correlation of blocks of time",
         "steadiness": measured.steadiness,
         **{name: getattr(measured, attribute) for name, attribute in _CHUTE.items()},
         **measured.notes,

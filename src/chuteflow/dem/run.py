@@ -108,8 +108,8 @@ def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) ->
     needed, free = script.bytes_written(scene, schedule), shutil.disk_usage(path).free
     if needed + _SPARE > free:
         raise InputError(
-            f"the run would write about {needed / 1e6:.0f} MB into {folder}, where {free / 1e6:.0f} MB are free: "
-            "give a shorter --measure or a longer --frame"
+            f"the run would write about {needed / 1e6:.0f} MB into {folder}, where {free / 1e6:.0f} MB are free and "
+            f"{_SPARE / 1e6:.0f} MB have to stay free: give a shorter --measure or a longer --frame"
         )
     _write(run, (script.DATA, script.SETTINGS, script.START, script.RESUME))
     return run
@@ -177,13 +177,13 @@ def _states(folder: Path) -> list[Path]:
 
 
 def _from_start(run: Run) -> list[str]:
-    for name in (script.LAYERS, script.TOTALS, script.CONTACTS):
+    for name in script.WRITTEN:
         (run.folder / name).unlink(missing_ok=True)
     return ["-in", script.START]
 
 
 def _resumed(run: Run, state: Path) -> list[str]:
-    trim(run.folder, (script.LAYERS, script.TOTALS, script.CONTACTS))
+    trim(run.folder, script.WRITTEN)
     return ["-in", script.RESUME, "-var", "from", state.name]
 
 
@@ -209,9 +209,9 @@ def _watched(run: Run, chosen: Engine, arguments: list[str]) -> Iterator[Moment]
         return
     if "read_restart" in output and "ERROR" in output:
         raise _StateError
-    where = f"the data up to step {run.done} of {steps.last} in {run.folder} are kept"
-    again = "" if "ERROR" in output else "; the same command goes on"
-    raise EngineError(f"{reason(output, code)}; {where}{again}")
+    kept = f"; the data up to step {run.done} of {steps.last} in {run.folder} are kept" if run.done else ""
+    again = "; the same command goes on" if kept and "ERROR" not in output else ""
+    raise EngineError(f"{reason(output, code)}{kept}{again}")
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """The input of LAMMPS for a scene: files that run with any LAMMPS that has the package GRANULAR, here or elsewhere.
 
 A folder holds grains.data (all positions), settings.in (everything but where the grains come from), start.in and
-resume.in. LAMMPS writes layers.txt, totals.txt, contacts.dump and the restart files state.a and state.b into it.
+resume.in. LAMMPS writes layers.txt, totals.txt, waves.txt, contacts.dump and the restart files state.a and state.b
+into it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from chuteflow.errors import InputError
 
 #: Names of the files in the folder of a run.
 DATA, SETTINGS, START, RESUME = "grains.data", "settings.in", "start.in", "resume.in"
-LAYERS, TOTALS, CONTACTS, LOG = "layers.txt", "totals.txt", "contacts.dump", "log.lammps"
+LAYERS, TOTALS, WAVES, CONTACTS, LOG = "layers.txt", "totals.txt", "waves.txt", "contacts.dump", "log.lammps"
+#: What LAMMPS appends to.
+WRITTEN = (LAYERS, TOTALS, WAVES, CONTACTS)
 STATES = ("state.a", "state.b")
 #: Height of the bins of layers.txt.
 BIN = 0.1
@@ -24,6 +27,11 @@ BIN = 0.1
 MOMENTS = ("vx", "vy", "vz", "xx", "yy", "zz", "xz", "ex", "ez")
 #: What totals.txt has in each line.
 SUMS = ("flux", "height", "yy", "zz", "force_x", "force_z")
+#: What waves.txt has in each line: means over all grains of the cosine and the sine of the longest wave that fits into
+#: the box along and across the slope, and of the same times the velocity.
+WAVE_PARTS = tuple(
+    f"{part}_{weight}{direction}" for direction in ("x", "y") for weight in ("", "v") for part in ("cos", "sin")
+)
 #: Times between samples of the velocities, between lines of totals.txt and between frames of contacts.dump.
 _SAMPLE, _LINE = 0.05, 1.0
 _MOST_BLOCKS = 400
@@ -163,6 +171,12 @@ def _settings(scene: Scene, steps: Steps) -> str:
         f"fix totals all ave/time {steps.sample} {steps.line // steps.sample} {steps.line} c_mean_vx c_mean_height "
         f"c_mean_yy c_mean_zz f_base[1] f_base[3] append {TOTALS} format ' %.10g'",
         "",
+        "# The longest waves that fit into the box: density, and momentum down the slope.",
+        *(f"variable {name} atom {formula}" for name, formula in _wave_formulas(scene).items()),
+        f"compute waves grains reduce ave {' '.join('v_' + name for name in WAVE_PARTS)}",
+        f"fix waves grains ave/time {steps.sample} {steps.line // steps.sample} {steps.line} c_waves[*] "
+        f"append {WAVES} format ' %.10g'",
+        "",
         "# The grains that touch another, a bump or the plane, from which the forces follow.",
         "compute touching all contact/atom",
         "variable touches atom (c_touching>0)||((type==1)&&(z<0.5))",
@@ -186,6 +200,12 @@ _PER_GRAIN = {
     "ez": "0.5*(vx*vx+vy*vy+vz*vz)*vz",
     "height": "z",
 }
+
+
+def _wave_formulas(scene: Scene) -> dict[str, str]:
+    phases = {axis: f"({2.0 * math.pi / length!r}*{axis})" for axis, length in zip("xy", scene.size, strict=True)}
+    formulas = {f"{part}_{axis}": f"{part}{phase}" for axis, phase in phases.items() for part in ("cos", "sin")}
+    return formulas | {name.replace("_", "_v"): f"{formula}*vx" for name, formula in formulas.items()}
 
 
 def contact_lines(contacts: Contacts) -> list[str]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
+from chuteflow.dem.correlation import long_run_variance
 from chuteflow.dem.output import Array
 
 #: Drifts are given over this time, and steady is below this share of the mean.
 SPAN, LIMIT = 300.0, 0.01
-#: Windows that a drift is told from.
-WINDOWS = 10
+#: Values that a drift is told from, at least.
+FEWEST = 10
 
 
 @dataclass(frozen=True)
@@ -33,18 +32,16 @@ class Drift:
 
 
 def drift(times: Array, values: Array) -> Drift:
-    """The drift of ``values`` (n,) at ``times`` (n,): a straight line through means over ten windows; its error is
-    that of their scatter about the line."""
-    count = min(WINDOWS, len(values))
-    if count < 4:
+    """The drift of ``values`` (n,) at ``times`` (n,), as even as they are: that of a straight line through them; its
+    error is that of their scatter about the line, whose correlation counts."""
+    if len(values) < FEWEST or not values.mean():
         return Drift(math.nan, math.nan)
-    t = np.array([part.mean() for part in np.array_split(times, count)])
-    y = np.array([part.mean() for part in np.array_split(values, count)])
-    away = t - t.mean()
-    slope = float(away @ y / (away @ away))
-    left = y - y.mean() - slope * away
-    error = math.sqrt(float(left @ left) / (count - 2) / float(away @ away))
-    scale = SPAN / abs(float(y.mean())) if y.mean() else math.nan
+    away = times - times.mean()
+    squares = float(away @ away)
+    slope = float(away @ values) / squares
+    left = values - values.mean() - slope * away
+    error = math.sqrt(float(long_run_variance(left, fitted=2)) / squares)
+    scale = SPAN / abs(float(values.mean()))
     return Drift(slope * scale, error * scale)
 
 

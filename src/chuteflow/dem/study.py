@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,14 +32,21 @@ HOT = (
     (0.9, 0.25, 3.0, 0.6),
 )
 #: Hot flows that are simulated on random bases too.
-RANDOM = (0, 1, 2, 5)
+RANDOM = (0, 2, 1, 5)
+#: Hot flows that keep their state. They settle slowly, in some 1500 time units.
+LASTING = (0, 3, 9, 2)
 SEEDS = (1, 2, 3)
 #: The paper's chute, and the hold-ups of its flows A, B and C at Q = 3.
 PAPER, PAPER_HOLDUPS = Chute(0.3, 0.8, 0.8, 0.6), {"A": 0.44, "B": 0.59, "C": 1.26}
 #: Errors of the restitution in one collision; they cancel over many.
 _BOUNDS = Bounds(restitution=3e-3)
 _SCHEDULE = Schedule(settle=300.0, measure=900.0)
+_LONG = Schedule(settle=1500.0, measure=2400.0)
 _BOX, _SMALLER_BOX = (12.0, 12.0), (9.0, 9.0)
+#: Flows on which the theory has waves across the slope that grow, by their numbers among the hot ones, each with a box
+#: that is about as wide as the fastest of them is long.
+WAVY = {13: (9.0, 48.0), 11: (9.0, 60.0)}
+_WAVE_SCHEDULE = Schedule(settle=100.0, measure=300.0)
 
 
 @dataclass(frozen=True)
@@ -52,22 +59,37 @@ class StudyCase:
 
 
 def cases() -> Iterator[StudyCase]:
-    """All runs, in the order in which they are done: every chute once before any seed is changed."""
-    yield from (_hot(number, 1) for number in range(10))
-    yield from (_hot(0, seed) for seed in SEEDS[1:])
-    yield from _variations()
+    """All runs, in the order in which they are done: every chute once before seeds are changed, and first the seeds of
+    flows that keep their state."""
+    done = set()
+    for case in _ordered():
+        if case.name not in done:
+            done.add(case.name)
+            yield case
+
+
+def _ordered() -> Iterator[StudyCase]:
+    yield from _waves()
     yield from _paper()
-    yield from (_hot(number, 1, base="random") for number in RANDOM)
-    yield from (_hot(number, 1) for number in range(10, len(HOT)))
-    yield from (_hot(number, seed) for seed in SEEDS[1:] for number in range(1, len(HOT)))
-    yield from (_hot(number, seed, base="random") for seed in SEEDS[1:] for number in RANDOM)
+    yield from (_hot(0, seed) for seed in SEEDS)
+    yield from _variations()
+    yield from (_hot(number, 1) for number in range(11))
+    yield from (_hot(number, 1, base="random") for number in (0, 2))
+    yield from (_hot(number, seed) for seed in SEEDS for number in LASTING)
+    for base in ("random", "triangular"):
+        yield from (_hot(number, seed, base) for seed in SEEDS for number in _of(base))
+
+
+def _of(base: str) -> Sequence[int]:
+    return RANDOM if base == "random" else range(len(HOT))
 
 
 def _hot(number: int, seed: int, base: str = "triangular") -> StudyCase:
     e, slope, holdup, roughness = HOT[number]
     box = _BOX if holdup < 2.0 else _SMALLER_BOX
     scene = Scene(Chute(slope, e, e, roughness), holdup, box=box, base=base, seed=seed, bounds=_BOUNDS)
-    return StudyCase(f"hot{number + 1:02d}-{base}-{seed}", scene)
+    schedule = _LONG if number in LASTING else _SCHEDULE
+    return StudyCase(f"hot{number + 1:02d}-{base}-{seed}", scene, schedule)
 
 
 def _paper() -> Iterator[StudyCase]:
@@ -81,9 +103,20 @@ def _variations() -> Iterator[StudyCase]:
     """The first chute with contacts twice as stiff, half the time step, and a box of twice the length."""
     first = _hot(0, 1)
     scene = like_theory(first.scene)
-    yield StudyCase("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness))
-    yield StudyCase("finer", replace(scene, bounds=replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)))
-    yield StudyCase("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1])))
+    finer = replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)
+    for name, varied in (
+        ("finer", replace(scene, bounds=finer)),
+        ("longer", replace(scene, box=(2.0 * _BOX[0], _BOX[1]))),
+        ("stiffer", replace(scene, stiffness=2.0 * scene.contacts.stiffness)),
+    ):
+        yield StudyCase(name, varied, first.schedule)
+
+
+def _waves() -> Iterator[StudyCase]:
+    """Flows with a wave that grows by the theory, in boxes for one wave across the slope."""
+    for number, box in WAVY.items():
+        scene = replace(_hot(number, 1).scene, box=box, bounds=Bounds(restitution=1e-2))
+        yield StudyCase(f"wide-{number + 1}", scene, _WAVE_SCHEDULE)
 
 
 def prepared(case: StudyCase, folder: str | os.PathLike[str]) -> Run:

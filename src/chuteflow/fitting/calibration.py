@@ -20,7 +20,7 @@ from chuteflow.fitting.intervals import BetterFit, Interval, interval
 from chuteflow.fitting.measurements import Measurements, Series
 from chuteflow.fitting.objective import LOSSES, Minimum, Objective
 from chuteflow.fitting.residuals import TrialChute, TrialFlow
-from chuteflow.fitting.starts import at, candidates
+from chuteflow.fitting.starts import MANY_TRIALS, StartingPoint, at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
@@ -41,6 +41,8 @@ _HOPELESS = 30.0
 CONFIDENCE = 0.95
 #: Trial chutes at most.
 _MOST_TRIALS = 100_000
+#: Passes over the parameters in which what fits for one widens the interval of another.
+_PASSES = 3
 #: Rounds in which intervals come upon a better fit.
 _ROUNDS = 4
 #: Parameters of two fits that differ by less, in their errors, are the same; flows by less in ln Q, h, M and T.
@@ -298,14 +300,13 @@ def fit(
         rise = _rise(confidence, objective.count - objective.unknowns, scale, measured.errors_known)
         try:
             intervals = _intervals(objective, best, covariance, rise, measured.errors_known)
-            better = _on_other_flows(objective, best, rise)
+            better = _on_other_flows(objective, best)
             if better is None:
                 break
             raise BetterFit(better)
         except BetterFit as found:
             others.append(best)
-            best = objective.minimise(found.found.x.copy(), found.found.places, most=_LAST, tolerance=_CLOSELY)
-            best = best or found.found
+            best = _ended(objective, found.found)
     else:
         raise SolveError("the fit keeps improving without converging: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
@@ -327,27 +328,49 @@ def _require_enough(objective: Objective) -> None:
 
 
 def _searched(objective: Objective, first: list[Array], trials: int | None) -> tuple[Minimum, list[Minimum]]:
-    """The best fit, and the other minima that starts led to."""
-    found = []
-    for start in candidates(objective, first, trials):
-        one = objective.minimise(objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY)
-        if one is not None:
-            found.append(one)
-    if not found:
-        raise SolveError("no trial flow could be followed to a fit: give ranges nearer to the answer")
-    found.sort(key=lambda one: one.chi2)
+    """The best fit, and the other minima that starts led to: from more trial chutes where those that are tried first
+    lead to nothing that resembles the measurements."""
+    if trials is not None:
+        return _searched_from(objective, candidates(objective, first, trials))
+    with suppress(InputError):
+        best, others = _searched_from(objective, candidates(objective, first))
+        if best.chi2 < _HOPELESS * objective.count:
+            return best, others
+    return _searched_from(objective, candidates(objective, first, MANY_TRIALS))
+
+
+def _searched_from(objective: Objective, starts: Sequence[StartingPoint]) -> tuple[Minimum, list[Minimum]]:
     kept: list[Minimum] = []
-    for one in found:
-        hopeless = kept and one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
+    left = []
+    for start in starts:
+        # Most starts are on their way to one minimum: it is looked for from the most promising of them.
+        one = objective.minimise(
+            objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY, known=kept
+        )
+        if one is not None and not kept:
+            kept.append(_ended(objective, one))
+        elif one is not None:
+            left.append(one)
+    if not kept:
+        raise SolveError("no trial flow could be followed to a fit: give ranges nearer to the answer")
+    closely = kept[0]
+    for one in sorted(left, key=lambda one: one.chi2):
+        hopeless = one.chi2 > _HOPELESS * (kept[0].chi2 + objective.count)
         if hopeless or any(_near(objective, one, other) or objective.leads_to(one, other) for other in kept):
             continue
-        kept.append(objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY) or one)
-        kept.sort(key=lambda one: one.chi2)
+        ended = objective.minimise(one.x.copy(), one.places, most=_SECOND, tolerance=_ROUGHLY, known=kept)
+        if ended is not None:
+            kept.append(ended)
+            kept.sort(key=lambda one: one.chi2)
     beyond = _beyond_fold(objective, kept[0])
     if beyond is not None:
         kept = sorted([beyond, *kept], key=lambda one: one.chi2)
-    best = objective.minimise(kept[0].x.copy(), kept[0].places, most=_LAST, tolerance=_CLOSELY) or kept[0]
-    return best, kept[1:]
+    return closely if kept[0] is closely else _ended(objective, kept[0]), kept[1:]
+
+
+def _ended(objective: Objective, one: Minimum) -> Minimum:
+    """The minimum that a fit leads to, closely."""
+    return objective.minimise(one.x.copy(), one.places, most=_LAST, tolerance=_CLOSELY) or one
 
 
 def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objective, Minimum] | None:
@@ -395,28 +418,36 @@ def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
 def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: float, known: bool) -> list[Interval]:
     """The intervals of all parameters.
 
-    Where a fold of a number that is known exactly is near, that number is relaxed; so it is where no flow goes on.
+    Where a fold of a number that is known exactly is near, that number is relaxed; so it is where no flow goes on. What
+    fits for one parameter at some distance is in the intervals of the others too.
     """
     near = _at_fold(objective, best)
     around = _relaxed(objective, best, _TIGHT) if near else None
     if around is not None and around[1].chi2 > best.chi2 + rise:
         near, around = False, None
-    found = []
-    for j in range(objective.parameters):
-        one = None
-        if near and around is not None:
-            with suppress(BetterFit):
-                one = interval(*around, _spread(*around, known)[1], j, rise)
-        if one is None or "no flow" in one.ends:
-            exact = interval(objective, best, covariance, j, rise)
-            one = exact if one is None else one.continued(exact)
-        if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
-            around = around or _relaxed(objective, best, _TIGHT)
-            if around is not None:
+    exactly: list[Minimum] = []
+    relaxedly: list[Minimum] = []
+    found: list[Interval | None] = [None] * objective.parameters
+    for _ in range(_PASSES):
+        for j, now in enumerate(found):
+            again = now is not None
+            if now is not None and not any(now.leaves_out(float(one.x[j])) for one in (*exactly, *relaxedly)):
+                continue
+            one = None
+            if near and around is not None:
                 with suppress(BetterFit):
-                    one = one.continued(interval(*around, _spread(*around, known)[1], j, rise))
-        found.append(one)
-    return found
+                    one = interval(*around, _spread(*around, known)[1], j, rise, relaxedly, onward=again)
+            if one is None or "no flow" in one.ends:
+                exact = interval(objective, best, covariance, j, rise, exactly, onward=again)
+                one = exact if one is None else one.continued(exact)
+            if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
+                around = around or _relaxed(objective, best, _TIGHT)
+                if around is not None:
+                    with suppress(BetterFit):
+                        relaxed = interval(*around, _spread(*around, known)[1], j, rise, relaxedly, onward=again)
+                        one = one.continued(relaxed)
+            found[j] = one
+    return [one for one in found if one is not None]
 
 
 def _near(objective: Objective, one: Minimum, other: Minimum) -> bool:
@@ -433,9 +464,8 @@ def _same_flows(one: Minimum, other: Minimum) -> bool:
     )
 
 
-def _on_other_flows(objective: Objective, best: Minimum, rise: float) -> Minimum | None:
+def _on_other_flows(objective: Objective, best: Minimum) -> Minimum | None:
     """A better fit that starts from other flows at the same parameters, where there are several experiments."""
-    del rise
     if len(objective.cases) == 1:
         return None
     values = best.x[: objective.parameters]

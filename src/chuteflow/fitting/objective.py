@@ -96,15 +96,23 @@ class Objective:
         return x
 
     def minimise(
-        self, x: Array, places: Sequence[TrialFlow], *, most: int, fixed: int | None = None, tolerance: float = 1e-9
+        self,
+        x: Array,
+        places: Sequence[TrialFlow],
+        *,
+        most: int,
+        fixed: int | None = None,
+        tolerance: float = 1e-9,
+        known: Sequence[Minimum] = (),
     ) -> Minimum | None:
         """The least sum of squares near ``x``, with the unknown number ``fixed`` kept, by ``most`` evaluations; None
-        where the flows at ``x`` cannot be reached from ``places``."""
+        where the flows at ``x`` cannot be reached from ``places``, or as soon as it is on its way to a minimum that is
+        ``known``."""
         from scipy.optimize import least_squares
 
-        run = _Minimisation(self, tuple(places), x.copy(), [j for j in range(self.unknowns) if j != fixed])
+        moving = [j for j in range(self.unknowns) if j != fixed]
+        run = _Minimisation(self, tuple(places), x.copy(), moving, tuple(known))
         low, high = self.bounds()
-        moving = run.moving
         x[moving] = np.clip(x[moving], low[moving], high[moving])
         first = run.residual(x[moving])
         if not np.isfinite(first).all():
@@ -112,12 +120,15 @@ class Objective:
         if not moving:
             return Minimum(x, float(first @ first), first, np.empty((len(first), 0)), run.places, True)
         # Flows far from the measurements have derivatives that no longer mean anything.
-        with np.errstate(all="ignore"):
-            found: Any = least_squares(
-                run.residual, x[moving], run.jacobian, bounds=(low[moving], high[moving]),
-                x_scale=self.scale()[moving], loss=cast(Any, self.loss), max_nfev=most,
-                ftol=tolerance, xtol=tolerance, gtol=1e-12,
-            )  # fmt: skip
+        try:
+            with np.errstate(all="ignore"):
+                found: Any = least_squares(
+                    run.residual, x[moving], run.jacobian, bounds=(low[moving], high[moving]), method="dogbox",
+                    x_scale=self.scale()[moving], loss=cast(Any, self.loss), max_nfev=most,
+                    ftol=tolerance, xtol=tolerance, gtol=1e-12,
+                )  # fmt: skip
+        except _OnTheWayError:
+            return None
         whole = x.copy()
         whole[moving] = found.x
         residual = run.residual(found.x)
@@ -143,14 +154,19 @@ class Objective:
         return True
 
 
+class _OnTheWayError(Exception):
+    """A minimisation is on its way to a minimum that is known."""
+
+
 @dataclass(eq=False)
 class _Minimisation:
-    """One minimisation: where the flows were last accepted, and where they were tried."""
+    """One minimisation: where the flows were last accepted, and where they were tried; what is ``known`` ends it."""
 
     objective: Objective
     places: tuple[TrialFlow, ...]
     x: Array
     moving: list[int]
+    known: tuple[Minimum, ...] = ()
     _tried: tuple[Array, tuple[TrialFlow, ...]] | None = None
 
     def residual(self, part: Array) -> Array:
@@ -181,7 +197,13 @@ class _Minimisation:
                 if column is not None:
                     out[rows, column] = values
             row = rows.stop
-        return np.where(np.isfinite(out), out, 0.0)[:, self.moving]
+        out = np.where(np.isfinite(out), out, 0.0)
+        if self.known:
+            residual = self.residual(part)
+            here = Minimum(self.x.copy(), float(residual @ residual), residual, out, self.places, False)
+            if any(objective.leads_to(here, other) for other in self.known):
+                raise _OnTheWayError
+        return out[:, self.moving]
 
     def accepted(self, part: Array) -> tuple[TrialFlow, ...]:
         """The flows at these unknowns, followed from where they were accepted; none where one is not found."""

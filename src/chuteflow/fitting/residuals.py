@@ -25,7 +25,7 @@ from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, varied
-from chuteflow.steady.model import model
+from chuteflow.steady.model import Model, model, model_along
 from chuteflow.steady.sensitivity import WHICH, Sensitivity, sensitivity, slopes_in_height
 from chuteflow.steady.solver import Condition, resolve
 
@@ -137,7 +137,7 @@ class TrialChute:
     def _followed(self, start: TrialFlow, values: Array, label: float, halvings: int) -> Flow | None:
         try:
             chute = self.at(values)
-            problem = model(chute)
+            problem = self._model(chute)
         except InputError:
             return None
         condition = self.exact or Condition(start.weights, label)
@@ -154,6 +154,13 @@ class TrialChute:
         if half is None:
             return None
         return self._followed(TrialFlow(half, middle, start.weights, between), values, label, halvings - 1)
+
+    def _model(self, chute: Chute) -> Model:
+        """The model of a chute, in a way that leaves the tables of its derivatives at hand: they are asked for next."""
+        for parameter in self.free:
+            if parameter.model_name == "restitution" or (parameter.model_name == "slope" and chute.law.knows_slope):
+                return model_along(chute, parameter.model_name, parameter.of(chute))[0]
+        return model(chute)
 
     def residual(self, flow: Flow, base: float = 0.0) -> Array:
         """Measured against computed: (computed - measured)/error, of the logarithms where errors are relative.

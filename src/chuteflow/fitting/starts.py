@@ -13,8 +13,8 @@ from chuteflow.fitting.residuals import TrialFlow
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.sobol import MOST_DIMENSIONS, Sobol
 
-#: Trial chutes, where there is one experiment, and at least where there are several.
-_TRIALS, _FEWEST = 64, 16
+#: Trial chutes, where there is one experiment, and at least where there are several; and where these were too few.
+_TRIALS, _FEWEST, MANY_TRIALS = 64, 16, 256
 #: Candidates that are followed to a minimum at most, and how far apart they are, in ranges of the parameters.
 _FOLLOWED, _APART = 4, 0.15
 #: Residuals of flows that nothing can be learnt from, such as those with no grains where some were measured.

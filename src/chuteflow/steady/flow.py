@@ -457,8 +457,18 @@ class Flow(Result):
             z = z - self._limit * np.log(np.maximum(share, _SMALLEST_SHARE))
         return z
 
-    @_vanishing
     def _shares_at(self, z: Array) -> Array:
+        """Fractions of the overburden at heights z. Those of the last heights are kept: fields, their derivatives in
+        height and those with respect to parameters are asked for at the same ones."""
+        kept: tuple[Array, Array] | None = self.__dict__.get("_last_shares")
+        if kept is None or not np.array_equal(kept[0], z):
+            kept = z.copy(), self._found_shares(z)
+            kept[1].setflags(write=False)
+            self.__dict__["_last_shares"] = kept
+        return kept[1]
+
+    @_vanishing
+    def _found_shares(self, z: Array) -> Array:
         """Fractions of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
         samples = self._samples["share"].copy()

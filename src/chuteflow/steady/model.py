@@ -133,7 +133,7 @@ def _invert(density: FunctionTable, x: Array) -> Array:
     (log_ratio, _), _ = density(_coordinate(samples))
     log_scaled = np.interp(log_x, np.log(samples) + log_ratio.real, np.log(samples))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
-    for _ in range(4):
+    for _ in range(3):
         scaled = np.exp(log_scaled)
         values, slopes = density(_coordinate(scaled))
         log_scaled = log_scaled - (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * _coordinate_slope(scaled))

@@ -356,6 +356,8 @@ _KNOWN_BY = 25
 _TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
 
 
+# Keyed by the law itself, as its tables are.
+@lru_cache(maxsize=256)
 def require_positive(law: Law, e: float, slope: float) -> None:
     """Check that a law gives numbers at every density, and that pressure, viscosity and conductivity are positive.
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.errors import InputError
 
 if TYPE_CHECKING:
     from chuteflow.dem.comparison import Candidate, Comparison, Difference
     from chuteflow.dem.measured import Measured
+    from chuteflow.dem.recovery import Recovery
 
 _EPILOG = (
     "RUN is what `chuteflow dem` has written, .nc or .csv, or a CSV of another code, see the page on simulations. "
@@ -53,6 +56,7 @@ _SAVED = (".json", ".csv")
 @options.option(
     "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not give it."
 )
+@options.option("--fit", metavar="NAMES", help="Find these parameters from the profiles too, such as e,ew,roughness.")
 @options.output_options(_SAVED, "profiles and functions")
 def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
     """Read, compare, tell and draw."""
@@ -65,9 +69,64 @@ def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
 
     measured = _with_parameters(records.load(run), given["roughness"], given["ew"])
     mappings = tuple(MAPPINGS) if given["roughness"] is None else ("spacing",)
-    found = compare(measured, options.closure_names(closures), mappings)
-    content = _content(found)
-    options.deliver_object(given, content, _report(found), partial(_rows, found), partial(plot_comparison, found))
+    names = options.closure_names(closures)
+    found = compare(measured, names, mappings)
+    fits = [] if given["fit"] is None else _fits(measured, names, given["fit"])
+    content = _content(found) | ({} if given["fit"] is None else _fitted_content(fits))
+    report = chain(_report(found), _fitted_report(measured, fits) if fits else ())
+    options.deliver_object(given, content, report, partial(_rows, found), partial(plot_comparison, found))
+
+
+def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[str, Recovery | str]]:
+    """For each closure the fit, or why there is none."""
+    from chuteflow.dem.recovery import recovered
+    from chuteflow.errors import ChuteflowError
+    from chuteflow.steady.free import chosen_parameters
+
+    names = [name.strip() for name in free.split(",") if name.strip()]
+    if not names:
+        raise InputError("--fit: which parameters are to be found, for example --fit e,ew,roughness?")
+    chosen_parameters(measured.chute(measured.roughness), names, {})
+    found: list[tuple[str, Recovery | str]] = []
+    for closure in closures:
+        try:
+            found.append((closure, recovered(measured, closure, names)))
+        except ChuteflowError as error:
+            found.append((closure, str(error)))
+    return found
+
+
+def _fitted_content(fits: Sequence[tuple[str, Recovery | str]]) -> dict[str, Any]:
+    from chuteflow.io.fit_records import comparison_object
+
+    done = [one.fit for _, one in fits if not isinstance(one, str)]
+    return comparison_object(done, [f"{closure}: {one}" for closure, one in fits if isinstance(one, str)])
+
+
+def _fitted_report(measured: Measured, fits: Sequence[tuple[str, Recovery | str]]) -> Iterator[str]:
+    from chuteflow.dem.recovery import FITTED
+    from chuteflow.io import tables
+
+    own = {"e": measured.restitution, "ew": measured.wall_restitution, "roughness": measured.roughness_by_area}
+    yield ""
+    yield (
+        f"fitted to nu, T and u over p/M from {FITTED[0]:g} to {FITTED[1]:g}, the height of the base unknown; errors "
+        "are widened where the theory does not hold within them"
+    )
+    header = ["closure", "parameter", "fitted", "error", "interval", "", "simulated", "errors widened"]
+    rows, reasons = [], []
+    for closure, one in fits:
+        if isinstance(one, str):
+            reasons.append(f"{closure}: no fit: {one}")
+            continue
+        for estimate in one.fit.estimates:
+            ends = (tables.number(estimate.interval.low), tables.number(estimate.interval.high))
+            real = tables.number(own[estimate.key]) if estimate.key in own else ""
+            value = tables.number(estimate.value)
+            rows.append([closure, estimate.key, value, f"{estimate.error:.2g}", *ends, real, f"{one.widening:.1f}"])
+    if rows:
+        yield tables.table([header, *rows], words=(0, 1))
+    yield from reasons
 
 
 def _with_parameters(measured: Measured, roughness: float | None, ew: float | None) -> Measured:

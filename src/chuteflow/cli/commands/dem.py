@@ -53,10 +53,10 @@ def command() -> None:
 
 
 @command.command("run", epilog=_EPILOG)
-@options.parameter_options
+@options.grain_options
 @options.option("--holdup", type=options.Number(), help="Mass hold-up M.")
 @options.option("--box", type=Box(), help="Length and width of the periodic box, as 12x12, the default.")
-@options.option("--base", metavar="NAME", help="Bumps of the base: triangular (the default) or random.")
+@options.option("--base", "bumps_base", metavar="NAME", help="Bumps of the base: triangular (the default) or random.")
 @options.option("--bumps", type=options.Number(), help="Bumps per unit area of a random base, instead of those of r.")
 @options.option("--bump-diameter", type=options.Number(), help="Diameter d_w of the bumps; 1 by default.")
 @options.option("--friction", type=options.Number(), help="Coefficient of sliding friction; 0 by default.")
@@ -140,7 +140,7 @@ def study_command(**given: Any) -> None:
     engine(processes)
     data = given["data"] or os.path.join(given["out"], "data")
     every = list(cases())
-    os.makedirs(data, exist_ok=True)
+    options.directory(data)
     for number, case in enumerate(every, 1):
         file = os.path.join(data, f"{case.name}.csv")
         if not os.path.exists(file):
@@ -149,6 +149,42 @@ def study_command(**given: Any) -> None:
             _carry_out(run, processes)
             records.save(thinned(measure(run)), file)
     click.echo(f"{len(every)} runs are in {data}")
+
+
+@command.command("waves")
+@click.argument("source", metavar="FOLDER|FILE")
+@options.option("--direction", metavar="NAME", help="across the slope (the default), or along it.")
+@options.option("--from", "begin", type=options.Number(), help="Time from which on the wave is fitted.")
+@options.option("--to", "end", type=options.Number(), help="Time up to which it is fitted.")
+@options.option("--save", metavar="FILE", help="Write the amplitudes to FILE: .csv.")
+def waves_command(source: str, **given: Any) -> None:
+    """How the longest wave that fits into the box grows, in a run in FOLDER or a FILE of --save."""
+    import math
+
+    from chuteflow.dem import waves
+    from chuteflow.dem.run import read_record
+    from chuteflow.io.tables import number
+    from chuteflow.io.writing import require_writable, write_whole
+
+    if given["save"] is not None:
+        require_writable(given["save"], (".csv",))
+    if os.path.isdir(source):
+        found = waves.amplitudes(read_record(source), given["direction"] or "across")
+    elif given["direction"] is not None:
+        raise InputError("--direction is for a folder: a file has one wave")
+    else:
+        found = waves.read_amplitudes(source)
+    begin, end = given["begin"], given["end"]
+    fitted = found.within(-math.inf if begin is None else begin, math.inf if end is None else end)
+    grown = waves.growth(fitted)
+    click.echo(
+        f"a wave of length {number(2.0 * math.pi / found.wavenumber)}, k = {number(found.wavenumber)}, from t = "
+        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)}, frequency "
+        f"{number(grown.frequency)}; that explains {100.0 * grown.share:.3g} % of its mean square"
+    )
+    if given["save"] is not None:
+        write_whole(given["save"], waves.written(found))
+        click.echo(f"written: {given['save']}")
 
 
 @command.command("results")
@@ -181,13 +217,11 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
 
     if given["holdup"] is None:
         raise InputError("missing --holdup, the mass hold-up M, for example --holdup 1.264")
-    # The base of the theory is another thing than that of the grains.
-    chute = options.chute({**given, "settings": (), "base": None})
+    chute = options.chute({**given, "settings": ()})
     named = {"overlap": "overlap", "contact_share": "contact_share", "restitution_error": "restitution"}
     bounds = Bounds(**{name: given[option] for option, name in named.items() if given[option] is not None})
     names = [
         "box",
-        "base",
         "bumps",
         "bump_diameter",
         "friction",
@@ -198,6 +232,9 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
         "stiffness",
     ]
     own = {name: given[name] for name in names if given[name] is not None}
+    # The base of a chute's file or case is that of the theory.
+    if given["bumps_base"] is not None:
+        own["base"] = given["bumps_base"]
     scene = Scene(chute, given["holdup"], bounds=bounds, **own)
     if scene.start == "hot" and given["temperature"] is None and given["velocity"] is None:
         scene = like_theory(scene)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Any
 
 import click
@@ -11,7 +10,6 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.cli.progress import Progress
-from chuteflow.errors import InputError
 from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
 from chuteflow.processes import available_cores
 
@@ -54,7 +52,7 @@ METHOD_HELP = "How flows are computed: overburden (this package's, the default) 
 @options.quiet_option
 def command(only: list[int] | None, out: str | None, kind: str | None, method: str | None, quiet: bool) -> None:
     """Compute, draw and write."""
-    folder = directory(out or ".")
+    folder = options.directory(out or ".")
     chosen = only or list(FIGURES)
     names = {number: folder / f"figure_{number:02d}.{kind or 'png'}" for number in chosen}
     from chuteflow.io.writing import require_writable, write_whole
@@ -78,17 +76,3 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
         ends = "; the method does not reach all flows: see the notes in the data" if incomplete(data) else ""
         took = f"{time.perf_counter() - begin:.1f} s"
         click.echo(f"figure {number}: {path} and {path.with_suffix('.csv').name}, {took}{unchanged}{ends}")
-
-
-def directory(name: str) -> Path:
-    """The directory of a name, created if needed.
-
-    Raises:
-        InputError: where it cannot be made.
-    """
-    folder = Path(name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the directory {name}: {error.strerror or error}") from None
-    return folder

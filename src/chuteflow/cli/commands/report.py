@@ -10,7 +10,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.figures import METHOD_HELP, FigureNumbers, directory
+from chuteflow.cli.commands.figures import METHOD_HELP, FigureNumbers
 from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
 from chuteflow.processes import available_cores
 
@@ -26,12 +26,12 @@ _NAME = "index.html"
 @click.command("report", help=COMMANDS["report"], epilog=_EPILOG)
 @options.option("--out", metavar="DIR", help="Directory to write to, created if needed; here by default.")
 @options.option("--method", type=click.Choice(METHODS), help=METHOD_HELP)
-@options.option("--only", type=FigureNumbers(), help="Numbers of the figures, such as 2,3; all by default.")
+@options.option("--only", type=FigureNumbers(), help="FigureNumbers of the figures, such as 2,3; all by default.")
 @click.option("--no-claims", is_flag=True, help="Leave out the claims.")
 @options.quiet_option
 def command(out: str | None, method: str | None, only: list[int] | None, no_claims: bool, quiet: bool) -> None:
     """Compute all, and write the page at the end, whole or not at all."""
-    path = directory(out or ".") / _NAME
+    path = options.directory(out or ".") / _NAME
     from chuteflow.io.writing import require_writable, write_whole
 
     require_writable(path, (".html",))
