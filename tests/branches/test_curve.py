@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, curve, flows
+from chuteflow.branches.ranges import BranchEnd
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 RANGE = (0.01, 500.0)
@@ -138,3 +139,9 @@ def test_no_family_says_why():
 def test_bad_input(given, message):
     with pytest.raises(InputError, match=message):
         curve(PAPER, **given)
+
+
+def test_a_branch_that_is_lost_leaves_the_curve_incomplete():
+    found = curve(Chute(0.37, 0.8, 0.8, 0.6, base="johnson-jackson:specularity=0.1"), points=10)
+    assert any(BranchEnd.of(end) is BranchEnd.LOST for branch in found.branches for end in branch.ends)
+    assert str(found.incomplete).startswith("a branch could not be followed beyond M = 14.1")

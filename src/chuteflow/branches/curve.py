@@ -13,7 +13,7 @@ import numpy as np
 
 from chuteflow.branches.existence import explain_imbalance
 from chuteflow.branches.paths import Chord, PathPoint, find_zero
-from chuteflow.branches.ranges import SearchRange
+from chuteflow.branches.ranges import BranchEnd, SearchRange
 from chuteflow.branches.results import Branch, Curve, SpecialPoint
 from chuteflow.branches.rough_turns import find_extrema
 from chuteflow.branches.solution_branches import (
@@ -109,6 +109,9 @@ def _branch(chute: Chute, branch: TracedBranch, count: int, tolerance: float, do
             # One point that is not found must not cost the curve.
             low, high = np.exp(np.sort(branch.macroscopic[[0, -1], LOG_M]))
             doubts.append(f"not all special points of the branch from M = {low:.4g} to {high:.4g} could be located")
+    for end, m in zip(branch.ends, branch.macroscopic[[0, -1]], strict=True):
+        if end == BranchEnd.LOST:
+            doubts.append(f"a branch could not be followed beyond M = {np.exp(m[LOG_M]):.4g}")
     ends, heading = branch.ends, 1.0
     if solutions[0].macroscopic[LOG_T] < solutions[-1].macroscopic[LOG_T]:
         solutions, ends, heading = solutions[::-1], (ends[1], ends[0]), -1.0
