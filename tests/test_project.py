@@ -1,7 +1,9 @@
 """The project itself: what is imported, in which direction, and what its files say of it."""
 
 import ast
+import importlib
 import importlib.metadata
+import importlib.util
 import inspect
 import re
 import shutil
@@ -124,6 +126,17 @@ def test_the_checks_take_no_arguments(arguments, code):
     done = subprocess.run([ROOT / ".ci/run", *arguments], capture_output=True, text=True, check=False, timeout=10)
     assert done.returncode == code
     assert len((done.stdout + done.stderr).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "path", [*(ROOT / "docs").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py")], ids=lambda p: p.name
+)
+def test_what_pages_and_benchmarks_import_is_there(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and str(node.module).split(".")[0] == "chuteflow":
+            module = importlib.import_module(str(node.module))
+            for name in (alias.name for alias in node.names):
+                assert hasattr(module, name) or importlib.util.find_spec(f"{module.__name__}.{name}"), name
 
 
 # The layers
