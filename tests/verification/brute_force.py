@@ -430,20 +430,6 @@ def along(entries, depths, stress, surface_flux, log_t, scale, zeros):
     return n
 
 
-@numba.njit(cache=True, error_model="numpy")
-def at_end(entries, depths, stress, surface_flux, log_t, scale, out):
-    """The residual at the last depth of one trajectory, and the quantities there."""
-    state, seen = np.empty(5), np.empty(4)
-    begin(entries, depths[0], stress, surface_flux, log_t, state)
-    for row in range(1, len(depths)):
-        advance(entries, depths[row - 1], depths[row] - depths[row - 1], stress, state)
-        look(entries, depths[row], state, scale, seen)
-        if not (seen[1] > -8.0 * scale):
-            return -1e6
-    quantities(entries, depths[-1], stress, state, out)
-    return seen[2]
-
-
 class BruteForce:
     """All flows of one chute with surface temperatures in a range and hold-ups up to ``deepest``."""
 
@@ -517,33 +503,3 @@ class BruteForce:
             flows = zeros[:n]
         same = len(counts) == 1
         return Found(flows, same, "" if same else "the trajectory is not known closely enough")
-
-    def polish(self, flow: np.ndarray, fineness: Fineness = Fineness()) -> np.ndarray | None:
-        """A flow of given M to the accuracy of the integration, by bisection of ln T_surface; None if that cannot."""
-        mass = math.exp(flow[2])
-        depths = self.depths(mass, fineness, self.coldest)
-        out = np.empty(4)
-
-        def residual(log_t: float) -> float:
-            stress = self.chute.surface_stress
-            return at_end(self.entries, depths, stress, self.surface_flux, log_t, self.scale, out)
-
-        width = 1e-5
-        for _ in range(3):
-            low, high = flow[3] - width, flow[3] + width
-            at_low, at_high = residual(low), residual(high)
-            if (at_low >= 0.0) != (at_high >= 0.0):
-                break
-            width *= 10.0
-        else:
-            return None
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            at_middle = residual(middle)
-            if (at_middle >= 0.0) == (at_low >= 0.0):
-                low = middle
-            else:
-                high = middle
-        # Else the trajectory is not known that closely from the surface.
-        met = abs(residual(0.5 * (low + high))) < 1e-8
-        return out.copy() if met and np.abs(out - flow).max() < 0.01 else None
