@@ -102,7 +102,7 @@ def test_waves_along_a_family(capsys, tmp_path):
     printed = json.loads(capsys.readouterr().out)
     assert np.shape(printed["growth"]) == (5, 5)
     assert len(printed["neutral"]) == 2
-    assert (tmp_path / "family.csv").read_text().startswith("kh,Q,h,M,T_surface,growth,frequency\n")
+    assert (tmp_path / "branch.csv").read_text().startswith("kh,Q,h,M,T_surface,growth,frequency\n")
 
 
 def test_no_flow_is_an_answer(capsys):
