@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow import Flow
-from chuteflow.steady.collocation import LOG_Q, Collocation
-from chuteflow.steady.solver import prolong
+from chuteflow.steady.collocation import LOG_Q, Collocation, prolong
 from timing import Time, median_time
 
 Array = NDArray[np.float64]

@@ -19,9 +19,9 @@ import numpy as np
 
 from chuteflow import Chute, Flow, flows
 from chuteflow.numerics.newton import newton
-from chuteflow.steady.collocation import LOG_Q, LOG_T
+from chuteflow.steady.collocation import LOG_Q, LOG_T, prolong
 from chuteflow.steady.mapped.solution import MappedSolution, best_multiple, refine, solve_mapped
-from chuteflow.steady.solver import Condition, prolong
+from chuteflow.steady.solver import Condition
 from timing import median_time
 
 Array = np.ndarray

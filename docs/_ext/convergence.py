@@ -9,9 +9,9 @@ from chuteflow import Flow, flows
 from chuteflow.paper.materials import dissipative
 from chuteflow.plotting import style
 from chuteflow.plotting.plots import write_figure
-from chuteflow.steady.collocation import LOG_Q
+from chuteflow.steady.collocation import LOG_Q, prolong
 from chuteflow.steady.mapped.solution import LARGEST_DEGREE, best_multiple, solve_mapped
-from chuteflow.steady.solver import Condition, prolong
+from chuteflow.steady.solver import Condition
 
 _FLUX = 3.0
 #: Smaller coefficients are noise.

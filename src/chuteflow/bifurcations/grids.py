@@ -40,10 +40,8 @@ def unpinned(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
     """The flow on a grid whose pieces meet where the pinned breaks are, which stay there from now on."""
     if not problem.pins:
         return problem, z
-    moved = carried_to(problem, z, replace(problem, breaks=_places(problem, z)))
-    nodes = len(problem.grid.nodes)
     other = replace(problem, breaks=_places(problem, z), pins=())
-    return other, np.concatenate([moved[:nodes], z[-2:]])
+    return other, carried_to(problem, z, other)
 
 
 def fitted(problem: Collocation, z: Array, stretch: float | None = None) -> Collocation | None:
@@ -76,16 +74,6 @@ def carried_to(problem: Collocation, v: Array, other: Collocation, at: Array | N
     g = interpolation_matrix(problem.grid, r) @ v[:nodes]
     moves = v[nodes:-2] if at is not None and len(other.pins) == len(problem.pins) else np.zeros(len(other.pins))
     return np.concatenate([g, moves, v[-2:]])
-
-
-def refined(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, Array]:
-    """The flow on the grid of another degree on each piece."""
-    nodes = len(problem.grid.nodes)
-    if problem.breaks == WHOLE:
-        other, matrix = problem.transferred(degree)
-        return other, np.concatenate([matrix @ z[:nodes], z[nodes:]])
-    other = replace(problem, degree=degree)
-    return other, np.concatenate([interpolation_matrix(problem.grid, other.grid.nodes) @ z[:nodes], z[nodes:]])
 
 
 def _places(problem: Collocation, z: Array) -> tuple[float, ...]:

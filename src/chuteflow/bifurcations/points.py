@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chuteflow.bifurcations.grids import refined, unpinned
+from chuteflow.bifurcations.grids import unpinned
 from chuteflow.bifurcations.system import BoundarySystem
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative
 from chuteflow.numerics.newton import newton, solve_each
-from chuteflow.steady.collocation import LOG_T
+from chuteflow.steady.collocation import LOG_T, prolong
 from chuteflow.steady.elements import DEGREES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.solver import Solution, SolverStatus
@@ -93,7 +93,7 @@ def solve_across(system: BoundarySystem, w: Array, tolerance: float) -> Boundary
 
 def refine_grid(system: BoundarySystem, w: Array, degree: int) -> tuple[BoundarySystem, Array]:
     """The system and a point of it on the grid of another degree."""
-    problem, z = refined(system.problem(float(w[-1])), w[:-1], degree)
+    problem, z = prolong(system.problem(float(w[-1])), w[:-1], degree)
     w = np.append(z, w[-1])
     return system.moved(problem, w), w
 

@@ -15,6 +15,7 @@ from chuteflow.branches.curve import curve
 from chuteflow.branches.results import Branch, Curve
 from chuteflow.explorer.straight import Sampler, straight_heights
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.interpolation import lagrange
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import PLACE
@@ -97,10 +98,8 @@ def sampled(chute: Chute, points: int, surface_temperature: tuple[float, float],
 def interpolated(table: Array, positions: Array) -> Array:
     """Rows of a ``table`` at ``positions`` between them, by the cubic through the four rows nearest to each."""
     first = np.clip(np.floor(positions).astype(int) - 1, 0, len(table) - 4)
-    a, b, c, d = (positions - first - k for k in range(4))
-    weights = -b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0
-    shape = (-1,) + (1,) * (table.ndim - 1)
-    return np.sum([weight.reshape(shape) * table[first + k] for k, weight in enumerate(weights)], axis=0)
+    rows = first + np.arange(4)[:, None]
+    return np.einsum("kn,kn...->n...", lagrange(rows.astype(float), positions), table[rows])
 
 
 def _sampled(branch: Branch) -> SampledBranch:

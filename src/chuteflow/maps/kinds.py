@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from chuteflow.branches.counting import most_at_once
 from chuteflow.branches.rough_turns import find_extrema
-from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros, lagrange
+from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.numerics.interpolation import lagrange
 from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import TrajectoryGrid
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.interpolation import lagrange
 from chuteflow.numerics.roots import false_position
 from chuteflow.steady.model import CONDUCTION, COUPLING, GAMMA, LOSS, WORK
 from chuteflow.trajectories import kernel
@@ -268,17 +269,6 @@ def _through_four(grid: TrajectoryGrid, left: Index, rows: Index, share: Array) 
         share[even] = place[sound]
     of = np.stack([quantities[..., 0], quantities[..., 3], state[..., S_L], state[..., S_Y]])
     return share, (of * weights).sum(axis=-1)
-
-
-def lagrange(at: Array, x: Array) -> Array:
-    """Weights (4, n) of cubic interpolation at ``x`` (n,) from values at ``at`` (4, n)."""
-    off = x - at
-    weights = np.empty_like(off)
-    for i in range(4):
-        j, k, m = (other for other in range(4) if other != i)
-        numerator = off[j] * off[k] * off[m]
-        weights[i] = numerator / ((at[i] - at[j]) * (at[i] - at[k]) * (at[i] - at[m]))
-    return weights
 
 
 def _hermite(one: Array, two: Array, slope_one: Array, slope_two: Array, t: Array) -> Array:

@@ -20,7 +20,7 @@ without slope at either end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -153,6 +153,13 @@ class Collocation:
         other = Collocation(self.model, degree, self.stretch if stretch is None else stretch, self.breaks)
         position = stretch_position(other.share[0], self.stretch)
         return other, interpolation_matrix(self.grid, position)
+
+
+def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, Array]:
+    """The flow of unknowns ``z`` on the grid of another degree on each piece, and its unknowns there."""
+    nodes = len(problem.grid.nodes)
+    other = replace(problem, degree=degree)
+    return other, np.concatenate([problem.grid.interpolate(z[:nodes], other.grid.nodes), z[nodes:]])
 
 
 class State:

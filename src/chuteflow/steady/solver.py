@@ -135,12 +135,6 @@ def default_stretch(model: Model, mass: float, temperature: float) -> float:
     return float(np.log1p(mass / (model.surface_stress or temperature)))
 
 
-def prolong(problem: Collocation, z: Array, degree: int) -> tuple[Collocation, Array]:
-    """The same flows on the grid of another degree."""
-    other, matrix = problem.transferred(degree)
-    return other, np.concatenate([z[..., :-2] @ matrix.T, z[..., -2:]], axis=-1)
-
-
 # It runs when a flow is first asked for its fields, and a flow that runs away is told by what is not finite.
 @on_one_thread
 @np.errstate(all="ignore")

@@ -25,8 +25,7 @@ let verdicts = new Map();
 let passed = null;
 // While the curve is dragged: ln of the quantity where the pointer is.
 let held = null;
-// Where the pointer reads the curve, in pixels, and how far from the curve it still does.
-let pointer = null;
+// How far from the curve the pointer still reads it, in pixels.
 const near = 30;
 
 // A small curve stays in view beside the sliders where the curve itself is out of it.
@@ -193,8 +192,7 @@ export function redraw() {
   shown = draw(svg, { x, y, points: curvePoints(name), lines, marks, hair: flux() * sq });
   if (away) draw(mini, { x: { ...x, label: "" }, y: { ...y, label: name }, lines, marks: marks.filter(({ shape }) => shape === "dot"), hair: flux() * sq });
   tellLimits();
-  if (pointer) readPointer();
-  else if (svg.matches(":focus-visible")) readout.speak(readChosen());
+  if (!readAgain() && svg.matches(":focus-visible")) readout.speak(readChosen());
   svg.setAttribute("aria-valuenow", String(fluxWithin(Number(state.Q) || 0) * sq));
   svg.setAttribute("aria-valuemin", String(frame.x.low * sq));
   svg.setAttribute("aria-valuemax", String(frame.x.high * sq));
@@ -223,8 +221,8 @@ function read({ Q, value, kind, limits: beyond }) {
 }
 
 /** The same of the flow at the pointer, if the curve is near. */
-function readPointer() {
-  const point = pointer && shown && held === null ? nearest(...pointer) : null;
+function readPointer(x, y) {
+  const point = shown && held === null ? nearest(x, y) : null;
   if (point && point.off < near) read(point); else readout.clear(svg);
 }
 
@@ -261,15 +259,8 @@ for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () =
   if (flow !== null) change({ flow });
   held = null;
 });
-readout.follow(svg, {
-  over: (...at) => {
-    pointer = at;
-    readPointer();
-  },
-  away: () => {
-    pointer = null;
-    readout.clear(svg);
-  },
+const readAgain = readout.followPointer(svg, {
+  read: readPointer,
   key: (name) => {
     if (!name) { readout.speak(readChosen()); return true; }
     const turn = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[name];

@@ -23,7 +23,7 @@ const first = 8, finest = 64, finestUnknown = 16, evenly = Array.from({ length: 
 const unknown = -1;
 // Places near which a column is looked at closely, at most.
 const mostNear = 32;
-let about = null, set = null, failure = "", shown = null, holding = false, pointer = null;
+let about = null, set = null, failure = "", shown = null, holding = false;
 // What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
 let wanted = {}, columns = [], whole = false, drawn = null;
 // Whether the columns are coarse ones, of while the sliders move, and whether the map is in view.
@@ -309,7 +309,7 @@ export function redraw() {
   const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
   key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
-  if (pointer) readPointer();
+  readAgain();
   key.append(failure || (current && whole ? "" : rough ? " Coarse, until the sliders rest." : ` Drawing: ${current ? columns.length : 0} columns so far.`));
   svg.classList.toggle("failed", Boolean(failure));
 }
@@ -345,22 +345,15 @@ function read(x, y) {
   return says.join(", ");
 }
 /** The same where the pointer is, if that is on the map. */
-function readPointer() {
-  const [x, y] = [shown.sx.inverse(pointer[0]), shown.sy.inverse(pointer[1])];
+function readPointer(px, py) {
+  const [x, y] = [shown.sx.inverse(px), shown.sy.inverse(py)];
   const inside = [[state.x, x], [state.y, y]].every(([name, value]) => value >= about.controls[name].low && value <= about.controls[name].high);
   if (inside && !holding) read(x, y); else readout.clear(svg);
 }
 const readHere = () => readout.speak(read(Number(state[state.x]), Number(state[state.y])));
 
-readout.follow(svg, {
-  over: (...at) => {
-    pointer = at;
-    readPointer();
-  },
-  away: () => {
-    pointer = null;
-    readout.clear(svg);
-  },
+const readAgain = readout.followPointer(svg, {
+  read: readPointer,
   key: (pressed) => {
     if (!pressed) { readHere(); return true; }
     const turn = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1] }[pressed];

@@ -46,3 +46,24 @@ export function follow(svg, { over, away, key }) {
     else if (key(event.key)) event.preventDefault();
   });
 }
+
+/**
+ * Follow a chart that is read where the pointer is: `read` (x, y in its pixels) is called there, and again by the
+ * function that is returned, which tells whether the pointer is on the chart; `key` as of `follow`.
+ */
+export function followPointer(svg, { read, key }) {
+  let pointer = null;
+  const again = () => { if (pointer) read(...pointer); return Boolean(pointer); };
+  follow(svg, {
+    over: (...at) => {
+      pointer = at;
+      again();
+    },
+    away: () => {
+      pointer = null;
+      clear(svg);
+    },
+    key,
+  });
+  return again;
+}
