@@ -616,7 +616,7 @@ def deliver_object(
     given: Mapping[str, Any],
     content: Any,
     report: Iterable[str],
-    rows: Callable[[], Iterable[Sequence[str]]],
+    rows: Callable[[], Iterable[Sequence[Any]]],
     plot: Callable[[], Figure],
 ) -> None:
     """Print the object ``content`` with --json, else the lines of ``report``; write it, or ``rows``, to the file that

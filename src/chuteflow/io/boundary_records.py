@@ -6,7 +6,7 @@ Turning points stand in their places along a boundary in tables, and apart in JS
 from __future__ import annotations
 
 import os
-from io import BytesIO
+from functools import partial
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,7 +16,7 @@ from chuteflow.io import contract
 from chuteflow.io.contract import PLACE, SHORT, finite, place_object, places_object
 from chuteflow.io.csv_file import write_columns
 from chuteflow.io.datasets import dataset
-from chuteflow.io.writing import as_text, require_writable, write_whole
+from chuteflow.io.writing import as_text, write_file
 from chuteflow.steady.quantities import Scales
 
 
@@ -32,8 +32,7 @@ def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[
         "range": list(found.bounds),
         "boundaries": [_boundary(boundary, second, scales) for boundary in found],
         "searched": {
-            "T_surface": list(found.searched.surface_temperature),
-            "M_max": found.searched.largest_holdup,
+            **contract.searched_object(found.chute, found.searched),
             second: list(found.sampled),
             "skipped": list(found.skipped),
         },
@@ -50,10 +49,7 @@ def save(found: BoundarySet, path: str | os.PathLike[str], *, scales: Scales | N
         InputError: for another ending, or a file that cannot be written.
     """
     write = {".json": _write_json, ".csv": _write_csv, ".nc": _write_netcdf}
-    suffix = require_writable(path, tuple(write))
-    stream = BytesIO()
-    write[suffix](found, stream, scales)
-    write_whole(path, stream.getvalue())
+    write_file(path, {suffix: partial(one, found, scales) for suffix, one in write.items()})
 
 
 def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[str, Any]:
@@ -74,11 +70,11 @@ def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[st
     }
 
 
-def _write_json(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
+def _write_json(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
     stream.write(contract.text(boundaries_object(found, scales)).encode() + b"\n")
 
 
-def _write_csv(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
+def _write_csv(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
     table = dataset(found, scales)
     columns = table.columns()
     kinds = columns["special"].tolist()
@@ -90,8 +86,7 @@ def _write_csv(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> N
         write_columns(file, columns)
 
 
-def _write_netcdf(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
-    from chuteflow.io.netcdf_file import create
+def _write_netcdf(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
+    from chuteflow.io.netcdf_file import write_groups
 
-    with create(stream) as file:
-        dataset(found, scales).write(file)
+    write_groups(stream, dataset(found, scales))

@@ -63,10 +63,7 @@ def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]
         "shares": shares(found),
         "cells": _cells(found) if found.most.size <= most_cells else None,
         "boundaries": [_boundary(one) for one in found.boundaries],
-        "searched": {
-            "T_surface": list(found.searched.surface_temperature),
-            "M_max": found.searched.largest_holdup,
-        },
+        "searched": contract.searched_object(plane.chute, found.searched),
     }
 
 
@@ -205,11 +202,6 @@ def _shares_from(kept: Any) -> tuple[float, ...]:
 # Files
 
 
-def write(found: Domain, stream: BinaryIO, suffix: str) -> None:
-    """Write a map to ``stream`` in the format of ``suffix``: .nc, .csv or .json."""
-    {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}[suffix](found, stream)
-
-
 def read(path: Path) -> Domain | None:
     """The map in a file, .nc, .csv or .json; None where it holds something else.
 
@@ -274,7 +266,7 @@ def _kept_in_csv(path: Path) -> Any:
 
 
 def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
-    from chuteflow.io.netcdf_file import create, fixed_text, history
+    from chuteflow.io.netcdf_file import fixed_text, history, write_groups
 
     map_ = dataset(found)
     kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
@@ -282,10 +274,13 @@ def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
         "long_name": "columns, from which chuteflow restores the map to the last bit",
         "kind": fixed_text(KIND),
     }
-    with create(stream) as file:
-        Dataset(map_.variables, {**map_.attributes, "history": history()}).write(file)
-        outlines(found).write(file.create_group("boundaries"))
-        Dataset({"columns": Variable(("byte",), kept)}, about).write(file.create_group("restore"))
+    root = Dataset(map_.variables, {**map_.attributes, "history": history()})
+    restore = Dataset({"columns": Variable(("byte",), kept)}, about)
+    write_groups(stream, root, boundaries=outlines(found), restore=restore)
+
+
+#: What writes a map to a stream, by the ending of the file.
+WRITERS = {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}
 
 
 def _kept_in_netcdf(path: Path) -> Any:

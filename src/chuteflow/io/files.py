@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib import import_module
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from chuteflow.errors import InputError
 from chuteflow.io import contract
 from chuteflow.io.reading import loading
 from chuteflow.io.records import KIND_OF, Result
-from chuteflow.io.writing import require_suffix, require_writable, write_whole
+from chuteflow.io.writing import as_text, require_suffix, write_file
 from chuteflow.steady.quantities import Scales
 
 if TYPE_CHECKING:
@@ -40,10 +40,11 @@ def save(result: Result | Domain, path: str | os.PathLike[str], *, scales: Scale
         return
     if type(result) not in KIND_OF:
         raise InputError(f"cannot save a {type(result).__name__}: save a flow, a set of flows, a curve or a domain")
-    writer = import_module(f"chuteflow.io.{FORMATS[require_writable(path, tuple(FORMATS))]}")
-    stream = BytesIO()
-    writer.write(result, stream, scales)
-    write_whole(path, stream.getvalue())
+
+    def write(module: str, stream: BinaryIO) -> None:
+        import_module(f"chuteflow.io.{module}").write(result, stream, scales)
+
+    write_file(path, {suffix: partial(write, module) for suffix, module in FORMATS.items()})
 
 
 def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | None) -> None:
@@ -51,25 +52,28 @@ def _save_domain(found: Domain, path: str | os.PathLike[str], scales: Scales | N
 
     if scales is not None:
         raise InputError("a domain has no units: save it without scales")
-    suffix = require_writable(path, tuple(FORMATS))
-    stream = BytesIO()
-    domain_records.write(found, stream, suffix)
-    write_whole(path, stream.getvalue())
+    write_file(path, {suffix: partial(write, found) for suffix, write in domain_records.WRITERS.items()})
 
 
 def write_answer(
-    path: str | os.PathLike[str], content: Callable[[], Any], rows: Callable[[], Iterable[Sequence[str]]]
+    path: str | os.PathLike[str], content: Callable[[], Any], rows: Callable[[], Iterable[Sequence[Any]]]
 ) -> None:
     """Write the object ``content`` to a JSON file, or ``rows`` to a CSV file, as the ending of ``path`` says.
 
     Raises:
-        InputError: where the file cannot be written.
+        InputError: for another ending, or a file that cannot be written.
     """
-    if str(path).lower().endswith(".json"):
-        text = contract.text(content())
-    else:
-        text = "\n".join(",".join(row) for row in rows())
-    write_whole(path, text + "\n")
+
+    def write_json(stream: BinaryIO) -> None:
+        stream.write(contract.text(content()).encode() + b"\n")
+
+    def write_csv(stream: BinaryIO) -> None:
+        from chuteflow.io.csv_file import write_rows
+
+        with as_text(stream) as file:
+            write_rows(file, rows())
+
+    write_file(path, {".json": write_json, ".csv": write_csv})
 
 
 def load(path: str | os.PathLike[str]) -> Result | Domain:

@@ -71,18 +71,15 @@ def _content(found: Sequence[FlowSet], scales: Scales | None) -> dict[str, Any]:
     return {"chute": _without_closure(sets[0]["chute"]), "closures": sets}
 
 
-def _rows(content: dict[str, Any]) -> Iterator[list[str]]:
-    """Every flow under every law as a row of CSV."""
+def _rows(content: dict[str, Any]) -> Iterator[list[Any]]:
+    """Every flow under every law as a row."""
     from chuteflow.steady.quantities import NUMBERS
 
     symbols = [quantity.symbol for quantity in NUMBERS.values()]
     yield ["closure", *symbols, "error"]
     for one in content["closures"]:
-        # A name with commas is a cell in quotes.
-        name = one["chute"]["closure"]
         for flow in one["flows"]:
-            cells = (flow[symbol] for symbol in (*symbols, "error"))
-            yield [f'"{name}"', *("" if cell is None else repr(cell) for cell in cells)]
+            yield [one["chute"]["closure"], *(flow[symbol] for symbol in (*symbols, "error"))]
 
 
 def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:
