@@ -5,8 +5,6 @@ Turning points stand in their places along a boundary in tables, and apart in JS
 
 from __future__ import annotations
 
-import os
-from functools import partial
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,7 +14,7 @@ from chuteflow.io import contract
 from chuteflow.io.contract import PLACE, SHORT, finite, place_object, places_object
 from chuteflow.io.csv_file import write_columns
 from chuteflow.io.datasets import dataset
-from chuteflow.io.writing import as_text, write_file
+from chuteflow.io.writing import as_text
 from chuteflow.steady.quantities import Scales
 
 
@@ -42,16 +40,6 @@ def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[
     }
 
 
-def save(found: BoundarySet, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
-    """Write boundaries to ``path``: .nc, .csv or .json, whole or not at all; in SI units where ``scales`` are given.
-
-    Raises:
-        InputError: for another ending, or a file that cannot be written.
-    """
-    write = {".json": _write_json, ".csv": _write_csv, ".nc": _write_netcdf}
-    write_file(path, {suffix: partial(one, found, scales) for suffix, one in write.items()})
-
-
 def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[str, Any]:
     return {
         second: boundary.parameter.tolist(),
@@ -70,11 +58,11 @@ def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[st
     }
 
 
-def _write_json(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
+def _write_json(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
     stream.write(contract.text(boundaries_object(found, scales)).encode() + b"\n")
 
 
-def _write_csv(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
+def _write_csv(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
     table = dataset(found, scales)
     columns = table.columns()
     kinds = columns["special"].tolist()
@@ -86,7 +74,11 @@ def _write_csv(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> N
         write_columns(file, columns)
 
 
-def _write_netcdf(found: BoundarySet, scales: Scales | None, stream: BinaryIO) -> None:
+def _write_netcdf(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
     from chuteflow.io.netcdf_file import write_groups
 
     write_groups(stream, dataset(found, scales))
+
+
+#: What writes boundaries to a stream, by the ending of the file.
+WRITERS = {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}

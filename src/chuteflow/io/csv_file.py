@@ -149,5 +149,5 @@ def _numbers(flow: Flow, scales: Scales | None) -> list[Any]:
     """The numbers and kinds of a flow."""
     numbers = [getattr(flow, name) * factor(name, flow.chute, scales) for name in NUMBERS]
     known = flow.validity
-    limits = [getattr(known, name) for name in VALIDITY]
+    limits = [float(getattr(known, name)) for name in VALIDITY]
     return [*numbers, flow.interior, flow.density, flow.error, *limits, known.summary, flow.name]

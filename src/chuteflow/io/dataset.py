@@ -103,7 +103,9 @@ class Dataset:
     def lists(self, name: str) -> Any:
         """The values of a variable as nested lists, None for those that are not finite, which JSON cannot hold."""
         values = self.variables[name].values
-        return np.where(np.isfinite(values), values, None).tolist()
+        found = values.astype(object)
+        found[~np.isfinite(values)] = None
+        return found.tolist()
 
     def write(self, group: h5netcdf.Group, inherited: Sequence[str] = ()) -> None:
         """Write all into a group of a NetCDF file, which has the dimensions ``inherited`` from that which it is in."""

@@ -213,7 +213,13 @@ def read(path: Path) -> Domain | None:
     return None if kept is None else _restored(kept)
 
 
-def _write_json(found: Domain, stream: BinaryIO) -> None:
+def _require_none(scales: Scales | None) -> None:
+    if scales is not None:
+        raise InputError("a domain has no units: save it without scales")
+
+
+def _write_json(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
+    _require_none(scales)
     whole = domain_object(found, found.most.size) | {"source": f"chuteflow {__version__}", "restore": _kept(found)}
     stream.write(contract.text(whole).encode() + b"\n")
 
@@ -223,8 +229,9 @@ def _kept_in_json(path: Path) -> Any:
     return kept if kept["kind"] == KIND else None
 
 
-def _write_csv(found: Domain, stream: BinaryIO) -> None:
+def _write_csv(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
     """One row for each cell, row by row from the lowest y, between comment lines."""
+    _require_none(scales)
     plane = found.plane
     table = dataset(found)
     y, x = np.meshgrid(found.y, found.x, indexing="ij")
@@ -265,7 +272,8 @@ def _kept_in_csv(path: Path) -> Any:
     return kept_in(lines, _RESTORE)
 
 
-def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
+def _write_netcdf(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
+    _require_none(scales)
     from chuteflow.io.netcdf_file import fixed_text, history, write_groups
 
     map_ = dataset(found)

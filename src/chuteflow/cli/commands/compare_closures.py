@@ -89,15 +89,11 @@ def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:
 def _report(found: Sequence[FlowSet], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
-    yield words.chute(found[0].chute).rpartition(", closure")[0]
-    if scales is not None:
-        yield words.scales(scales)
+    first, *rest = words.introduction(found[0].chute, scales)
+    yield from (first.rpartition(", closure")[0], *rest)
     yield ""
-    ends = (("closure", "error", "validity"), ("", "[1]", ""))
-    header = [
-        [first, *cells, error, validity]
-        for (first, error, validity), cells in zip(ends, tables.heading(("mass_flux", *_COLUMNS), scales), strict=False)
-    ]
+    after = (("error", "1"), ("validity", ""))
+    header = tables.heading(("mass_flux", *_COLUMNS), scales, before=(("closure", ""),), after=after)
     rows: list[list[str]] = []
     for flow_set in found:
         name = str(flow_set.chute.closure)

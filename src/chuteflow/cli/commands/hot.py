@@ -111,9 +111,7 @@ def _report(found: HotModel, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
     numbers = found.as_dict()
-    yield words.chute(found.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(found.chute, scales)
     yield ""
     values = {name: math.inf if numbers[name] is None else numbers[name] for name in _PARAMETERS}
     rows = [[name, tables.number(values[name]), what] for name, what in _PARAMETERS.items()]

@@ -42,7 +42,7 @@ _EPILOG = (
 @click.command("relax", help=COMMANDS["relax"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
-@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.flow_option
 @options.option(
     "--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default, or 1 with --push."
 )
@@ -51,7 +51,6 @@ _EPILOG = (
 @options.output_options(_SAVED)
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
-    from chuteflow.branches.enumeration import flows
     from chuteflow.stability.disturbed import DURATION, LONGEST, relax
 
     options.require_outputs(given, _SAVED)
@@ -62,11 +61,9 @@ def command(**given: Any) -> None:
     if not 0.0 < duration <= LONGEST:
         raise InputError(f"--duration {duration:g}: must be above 0 and at most {LONGEST:g}")
     condition: dict[str, Any] = options.condition(given, chute, scales)
-    found = flows(chute, **condition)
-    if not len(found):
-        options.deliver_without_flow(given, found, condition, scales, {"flows": []})
+    flow = options.solve_one(given, chute, condition, scales, {"flows": []})
+    if flow is None:
         return
-    flow = options.chosen(found, given["which"])
     with Progress(seconds=1.0) as progress:
         followed = relax(
             flow,
@@ -123,9 +120,7 @@ def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: 
     by = {name: factor(name, flow.chute, scales) for name in _COLUMNS.values()}
     rows = [[number(by[name] * getattr(moments[i], name)) for name in by] for i in sorted(wanted)]
     units = [] if scales is None else [[f"[{SCALED[name].unit}]" for name in by]]
-    yield words.chute(flow.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(flow.chute, scales)
     yield ""
     yield table([list(_COLUMNS), *units, *rows])
     yield ""
