@@ -1,4 +1,4 @@
-"""The study of theory against particles: its runs, one after the other, each in a folder that is resumed."""
+"""The study of theory and particle simulations: its runs, each in a folder that can be resumed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from chuteflow.dem.contacts import Bounds
 from chuteflow.dem.run import RECORD, Run, prepare, read_record
 from chuteflow.dem.scene import Scene
 from chuteflow.dem.script import Schedule
-from chuteflow.dem.start import like_theory
+from chuteflow.dem.start import start_near_theory
 from chuteflow.steady.chute import Chute
 
 #: e, slope, M and r of the hot flows; the base has the restitution of the grains.
@@ -103,7 +103,7 @@ def _paper() -> Iterator[StudyCase]:
 def _variations() -> Iterator[StudyCase]:
     """The first chute with contacts twice as stiff, half the time step, and a box of twice the length."""
     first = _hot(0, 1)
-    scene = like_theory(first.scene)
+    scene = start_near_theory(first.scene)
     finer = replace(_BOUNDS, restitution=_BOUNDS.restitution / 2.0)
     for name, varied in (
         ("finer", replace(scene, bounds=finer)),
@@ -126,5 +126,5 @@ def prepared(case: StudyCase, folder: str | os.PathLike[str]) -> Run:
     if (path / RECORD).exists():
         scene = read_record(path).scene
     else:
-        scene = like_theory(case.scene) if case.scene.start == "hot" else case.scene
+        scene = start_near_theory(case.scene) if case.scene.start == "hot" else case.scene
     return prepare(path, scene, case.schedule)
