@@ -34,7 +34,7 @@ WAVE_PARTS = tuple(
 )
 #: Times between samples of the velocities, between lines of totals.txt and between frames of contacts.dump.
 _SAMPLE, _LINE = 0.05, 1.0
-_MOST_BLOCKS = 400
+_MOST_BLOCKS = 1000
 
 
 @dataclass(frozen=True)
