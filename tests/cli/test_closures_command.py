@@ -24,8 +24,8 @@ OWN = replace(EXTENDED, name="own")
 
 
 def changed(name, **how):
-    def coefficients(nu, room, e, slope):
-        return replace(LUN.coefficients(nu, room, e, slope), **{key: value(nu) for key, value in how.items()})
+    def coefficients(nu, free_fraction, e, slope):
+        return replace(LUN.coefficients(nu, free_fraction, e, slope), **{key: value(nu) for key, value in how.items()})
 
     return Law(name, "", "", LUN.densest, coefficients)
 
@@ -44,7 +44,7 @@ PACKED = Law("packed", "", "", "0.62", LUN.coefficients)
 BREAKS = Law("breaks", "", "", 0.62, lambda *all: LUN.coefficients(*all), breaks=lambda e, slope: 1 / 0)
 BEYOND = Law("beyond", "", "", 0.62, lambda *all: LUN.coefficients(*all), breaks=(0.7,))
 SINGLE = changed("single", bulk_viscosity=lambda nu: 0.0, density_conductivity=lambda nu: 0)
-NOTHING = Law("nothing", "", "", 0.62, lambda nu, room, e, slope: None)
+NOTHING = Law("nothing", "", "", 0.62, lambda nu, free_fraction, e, slope: None)
 NUMBER = 3
 """
 

@@ -33,7 +33,7 @@ class BaseState:
 
     flow: Flow
     resolution: Resolution
-    share: Array
+    fraction: Array
     profile: Profile
     derivative: Array
     weights: Array
@@ -46,26 +46,26 @@ class BaseState:
     @property
     def points(self) -> int:
         """Number of nodes."""
-        return len(self.share)
+        return len(self.fraction)
 
 
 def base(flow: Flow, resolution: Resolution) -> BaseState:
     """``flow`` on the grid of ``resolution``; ``weights`` are those of integrals over the height."""
     g = grid(resolution.degree)
-    share, rate = shares(g.nodes, resolution)
-    profile = flow.at_overburden(share)
+    fraction, rate = overburden_fractions(g.nodes, resolution)
+    profile = flow.at_overburden(fraction)
     fall = profile.volume_fraction / (flow.mass_holdup * rate)  # -ds/dz
     return BaseState(
         flow=flow,
         resolution=resolution,
-        share=share,
+        fraction=fraction,
         profile=profile,
         derivative=-fall[:, None] * g.derivative,
         weights=g.weights / fall,
     )
 
 
-def shares(s: Array, resolution: Resolution) -> tuple[Array, Array]:
+def overburden_fractions(s: Array, resolution: Resolution) -> tuple[Array, Array]:
     """m(s) and dm/ds of the map ln m + beta m = (ln m + beta m at the base) - (1 - s) times its range."""
     reach, beta = resolution.reach, resolution.beta
     span = reach + beta * -np.expm1(-reach)

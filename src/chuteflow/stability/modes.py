@@ -23,7 +23,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
 from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue, spectrum
 from chuteflow.result import Compared
-from chuteflow.stability.base import BaseState, Resolution, base, shares
+from chuteflow.stability.base import BaseState, Resolution, base, overburden_fractions
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -134,7 +134,7 @@ class Mode(Compared):
         """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
         base_ = self.operator.base
         s = grid(points - 1).nodes[::-1]
-        fraction, _ = shares(s, base_.resolution)
+        fraction, _ = overburden_fractions(s, base_.resolution)
         matrix = interpolation_matrix(base_.grid, s)
         return self.flow.at_overburden(fraction).height, self.fields @ matrix.T
 

@@ -149,7 +149,7 @@ class Elements:
         """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""
         theta, y = self.at(problem.grid.nodes).T
         mass = np.exp(self.log_mass)
-        p = mass * problem.share[0] + self.model.surface_stress
+        p = mass * problem.fraction[0] + self.model.surface_stress
         f, _ = self.model.closures(self.model.density_argument(p, theta))
         return np.concatenate([mass * y / f[CONDUCTION], [theta[0], self.log_mass]]), y
 

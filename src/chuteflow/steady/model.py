@@ -79,16 +79,17 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
 
     def functions(c: Array) -> Array:
         x = _argument(c)
-        ratio = _invert(density, x)  # of room-scaled density to x
+        ratio = _invert(density, x)  # of density scaled by the free fraction to x
         scaled = x * np.exp(ratio)
         r = reduce(chosen, scaled, e, slope)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
+        free_fraction = 1.0 / (1.0 + scaled / chosen.densest)
         (_, gamma), _ = density(_coordinate(scaled))
         k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
-        gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(room) + np.log(r.compressibility))
+        gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(free_fraction) + np.log(r.compressibility))
         return np.stack(
-            [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + np.log(room), gamma], axis=-1
+            [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + np.log(free_fraction), gamma],
+            axis=-1,
         )
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
@@ -108,20 +109,20 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence
 
     def gamma_slope(c: Array) -> Array:
         scaled = _argument(c)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
-        rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
+        free_fraction = 1.0 / (1.0 + scaled / chosen.densest)
+        rate = reduce(chosen, scaled, e, slope).coupling * free_fraction**2  # dGamma/dscaled
         return rate[:, None] * ((scaled + OFFSET) * (1.0 + np.log1p(scaled / OFFSET)))[:, None]
 
     gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE, breaks))
 
     def functions(c: Array) -> Array:
         scaled = _argument(c)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
+        free_fraction = 1.0 / (1.0 + scaled / chosen.densest)
         (big_gamma,), _ = gamma(c)
         log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
         if np.all(b == 0.0):
-            return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
-        return np.stack([np.log(room) + (log_g + big_gamma) / (1.0 - b), big_gamma], axis=-1)
+            return np.stack([log_g + np.log(free_fraction) + big_gamma, big_gamma], axis=-1)
+        return np.stack([np.log(free_fraction) + (log_g + big_gamma) / (1.0 - b), big_gamma], axis=-1)
 
     return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
 

@@ -1,7 +1,7 @@
 """How a flow answers to small changes of its parameters: exact derivatives by the implicit function theorem.
 
 # notation: z unknowns of a flow (n+3,), F(z, lambda) = 0 (n+2,) the discretised steady problem, m(z, lambda) = (ln Q,
-# ln h, ln M, ln T_surface), t unit tangent of the branch in the space of m, share = P/M of the overburden.
+# ln h, ln M, ln T_surface), t unit tangent of the branch in the space of m, P/M fraction of the overburden.
 
 The flows of one chute are a branch. Beside a flow, F_z dz + F_lambda dlambda = 0 has one solution along the branch, and
 one for each parameter, once that is made unique. It is taken across the branch, t . dm = 0: this is finite everywhere,
@@ -167,7 +167,7 @@ class _ReferenceFlow:
         state, problem = flow._state, flow.solution.problem
         matrix = interpolation_matrix(problem.grid, stretch_position(fraction, problem.stretch))
         theta, g = matrix @ state.theta, matrix @ state.g
-        bend = matrix @ (problem.grid.derivative @ state.g / problem.share[1])
+        bend = matrix @ (problem.grid.derivative @ state.g / problem.fraction[1])
         mass = state.mass[0]
         p = mass * fraction + flow._model.surface_stress
         local = flow._local(*flow._pointwise(stepped(p, mass), stepped(theta, g), stepped(g, bend)))
