@@ -78,7 +78,14 @@ class PiecewiseGrid:
     @cached_property
     def integral(self) -> Array:
         """Matrix (N d + 1, N d + 1) of :meth:`integrate`."""
-        return _of_method(self.integrate, len(self.nodes))
+        matrix, whole_pieces = np.zeros((len(self.nodes),) * 2), np.zeros(len(self.nodes))
+        for columns, block in zip(self.columns, self._widths[..., None] * self.piece.integral, strict=True):
+            rows = columns[1:]
+            matrix[rows] = whole_pieces
+            matrix[np.ix_(rows, columns)] += block[1:]
+            whole_pieces[columns] += block[-1]
+        matrix.setflags(write=False)
+        return matrix
 
     def differentiate(self, values: Array) -> Array:
         """Derivatives at the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""

@@ -33,6 +33,7 @@ from chuteflow.parameters import CONDITIONS
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, stretch_position
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, all_free, free_parameter
+from chuteflow.steady.linearised import rates_along_branch, solve_bordered
 from chuteflow.steady.model import Model, stepped_model
 from chuteflow.steady.quantities import FIELDS, NUMBERS
 from chuteflow.steady.solver import Solution
@@ -360,8 +361,8 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     free = tuple(one if isinstance(one, FreeParameter) else free_parameter(chute, one) for one in asked)
     condition = _condition(at)
     problem, z, state = flow.solution.problem, flow.solution.z, flow.solution.state
-    jacobian, gradient = state.jacobian(), state.macroscopic_gradient()
-    weights = _transversal(flow, jacobian, gradient)
+    gradient = state.macroscopic_gradient()
+    weights = _transversal(flow, gradient)
     beyond = [stepped_model(chute, parameter.model_name) for parameter in free]
     states = [replace(problem, model=one).state(z) for one in beyond]
     sides = np.zeros((len(z), 1 + len(free)))
@@ -369,7 +370,7 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     for j, one in enumerate(states):
         sides[:-1, 1 + j] = -derivative(one.residual())
         sides[-1, 1 + j] = -weights @ derivative(one.macroscopic())
-    found: Any = np.linalg.solve(np.concatenate([jacobian, (weights @ gradient)[None]]), sides)
+    found = solve_bordered(state, weights @ gradient, sides)
     length = float(np.linalg.norm(gradient @ found[:, 0]))
     ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
@@ -383,12 +384,11 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     return Sensitivity(flow, free, condition, tangent, across, tuple(moved))
 
 
-def _transversal(flow: Flow, jacobian: Array, gradient: Array) -> Array:
+def _transversal(flow: Flow, gradient: Array) -> Array:
     """Weights (4,) of the quantities such that their sum changes along the branch."""
     rates = flow.solution.rates
-    if rates is None:
-        # A flow that was loaded: the null vector of its Jacobian.
-        rates = gradient @ np.linalg.svd(jacobian)[2][-1]
+    if rates is None:  # a flow that was loaded
+        rates = rates_along_branch(flow.solution.state, gradient)
     return rates / np.linalg.norm(rates)
 
 
