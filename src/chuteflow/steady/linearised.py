@@ -27,7 +27,8 @@ def solve_bordered(state: State, border: Array, sides: Array) -> Array:
     """The changes of z (n+3, k) for which F changes by ``sides[:-1]`` and ``border`` (n+3,) . z by ``sides[-1]``."""
     grid = state.problem.grid
     if not isinstance(grid, PiecewiseGrid) or len(state.g) <= _DENSE or state.problem.pins:
-        return np.linalg.solve(np.concatenate([state.jacobian(), border[None]]), sides)
+        dense: Any = np.linalg.solve(np.concatenate([state.jacobian(), border[None]]), sides)
+        return dense
     from scipy.sparse.linalg import splu
 
     nodes, matrix = len(state.g), _sparse(state, grid, border)
