@@ -207,7 +207,7 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
             found.append(one)
             progress.show(f"{len(found)} flows compared")
     text = tables.table(table(found, names), words=(0, 5))
-    options.deliver(given, text, None, lambda: plot_results(found))
+    options.deliver({**given, "as_json": False}, dict, [text], None, lambda: plot_results(found))
 
 
 def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:

@@ -68,7 +68,8 @@ def _report(found: Design) -> Iterator[str]:
     if found.reason:
         yield f"no solution: {found.reason}"
         return
-    rows = [["", *(p.key for p in found.unknown), *tables.heading(_COLUMNS, None)[0], "validity"]]
+    before = [("", ""), *((parameter.key, "") for parameter in found.unknown)]
+    rows = tables.heading(_COLUMNS, None, before=before, after=(("validity", ""),))
     for i, one in enumerate(found.solutions, 1):
         cells = tables.numbers(one.flow, _COLUMNS, one.flow.chute, None)
         rows.append([str(i), *map(tables.number, one.values.tolist()), *cells, one.flow.validity.summary])
