@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 
 import click
@@ -142,11 +143,26 @@ def test_cases_are_listed_and_told(run):
 
 def test_a_case_makes_a_chute_in_python(file):
     assert case("sand").chute(slope=0.35).restitution == 0.7
-    with pytest.raises(chuteflow.InputError, match="sand has no slope"):
+    with pytest.raises(chuteflow.InputError, match=r"sand has no slope: give slope=... \(or angle=... in degrees\)"):
         case("sand").chute()
+    assert case("sand").chute(angle=19, e=0.75) == chuteflow.Chute.at_angle(19, 0.75, 0.7, 0.7)
+    assert chuteflow.cases()["sand"] == case("sand")
+    for wrong, message in (
+        ({"slope": 0.3, "angle": 20}, "slope is given twice, also as angle"),
+        ({"slope": 0.3, "ew": 0.7, "wall_restitution": 0.8}, "wall_restitution is given twice"),
+        ({"slope": 0.3, "rough": 0.6}, "unknown argument 'rough': did you mean roughness?"),
+    ):
+        with pytest.raises(chuteflow.InputError, match=re.escape(message)):
+            case("sand").chute(**wrong)
     mine = read_chute(file)
     assert mine.scales == chuteflow.Scales(1e-3, 2500.0)
     assert mine.chute().roughness == 0.65
+
+
+def test_a_case_shows_how_each_number_is_known():
+    table = case("glass-beads")._repr_html_()
+    assert "<td>roughness</td><td>0.65 </td><td>0.1</td><td>guessed</td>" in table
+    assert "0.003 m" in table
 
 
 # Units

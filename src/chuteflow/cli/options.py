@@ -468,7 +468,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
     Raises:
         InputError: for scales that are incomplete, no such units or not positive.
     """
-    from chuteflow.steady.cases import GRAINS
+    from chuteflow.steady.quantities import GRAINS
 
     texts = {name: given[name] for name in GRAINS if given[name] is not None}
     if not texts and not given["si"]:
@@ -478,7 +478,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
         if name not in texts and name not in known:
             also = "; a --chute file or a --case of `chuteflow cases` may give them too" if given["si"] else ""
             raise InputError(f"SI units need --diameter and --density: --{name} is missing{also}")
-    from chuteflow.io.units import read_si
+    from chuteflow.amounts import read_si
     from chuteflow.steady.quantities import Scales
 
     return Scales(**{**known, **{name: read_si(f"--{name}", text, GRAINS[name]) for name, text in texts.items()}})
@@ -508,7 +508,8 @@ def amount(given: Mapping[str, Any], name: str, quantity: str, slope: float, sca
     Raises:
         InputError: for text that is no amount, or a unit without grains.
     """
-    from chuteflow.io.units import bare, read_amount
+    from chuteflow.amounts import bare
+    from chuteflow.io.units import read_amount
     from chuteflow.steady.quantities import SCALED
 
     text = str(given[name])

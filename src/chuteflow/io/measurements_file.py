@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from chuteflow.amounts import read_si
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
 from chuteflow.fitting.measurements import (
@@ -26,7 +27,6 @@ from chuteflow.fitting.measurements import (
     assembled,
     together,
 )
-from chuteflow.io.units import read_si
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.quantities import QUANTITIES, Scales
 

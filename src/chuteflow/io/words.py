@@ -26,7 +26,6 @@ _INTERIORS = {
     "productive": "interior productive throughout",
     "mixed": "interior productive in some places and dissipative in others (mixed)",
 }
-_SURFACES = {"free": "free surface", "interface": "interface with free grains above"}
 
 
 def among(flow: Flow, flows: Sequence[Flow]) -> str:
@@ -61,9 +60,7 @@ def kinds(flow: Flow) -> str:
 
 def chute(chute: Chute) -> str:
     """All parameters of ``chute``."""
-    slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
-    numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
-    return f"chute: {numbers}, {_SURFACES[chute.surface]}, {chute.laws}"
+    return f"chute: {chute.summary}"
 
 
 def scales(scales: Scales) -> str:
