@@ -16,6 +16,9 @@ from chuteflow.steady.quantities import FIELDS, NUMBERS, QUANTITIES, SCALED, Sca
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+#: What is said of a unit where the grains are not known.
+WITHOUT_GRAINS = "a unit needs the grains: give their diameter and density too, or --si for those of a file or case"
+
 
 @dataclass(frozen=True, eq=False)
 class FlowInUnits:
@@ -77,5 +80,5 @@ def read_amount(what: str, text: str, name: str, scales: Scales | None, slope: f
         return plain
     if scales is None:
         converted(what, text, SCALED[name].unit, "dimensionless")
-        raise InputError(f"{what} {text!r}: a unit needs the grains, give their diameter and density too")
+        raise InputError(f"{what} {text!r}: {WITHOUT_GRAINS}")
     return scales.dimensionless(name, text, slope, what)
