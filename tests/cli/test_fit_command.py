@@ -192,7 +192,7 @@ def test_bad_data_are_one_line(content, said, tmp_path, capsys):
         (["design", *PAPER, "--flux", "3"], "missing --unknown"),
         (
             ["design", *PAPER[2:], "--unknown", "slope", "--flux", "3 kg/m/s", "--holdup", "1"],
-            "need the slope, which is unknown: omit the unit",
+            "which is unknown: omit the unit",
         ),
         (["design", *PAPER, "--unknown", "slope", "--flux", "3"], "1 condition for 1 unknown parameter"),
         (["design", *PAPER, "--unknown", "slope", "--flux", "3", "--want", "width=3"], "unknown quantity 'width'"),
