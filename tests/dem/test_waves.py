@@ -30,10 +30,10 @@ def made(rate, frequency, noise=0.0, times=None):
 def test_rate_and_frequency_of_a_wave_come_back(rate, frequency):
     found = growth(made(rate, frequency))
     assert (found.rate, found.frequency) == pytest.approx((rate, frequency), abs=1e-8)
-    assert found.share == pytest.approx(1.0)
+    assert found.explained == pytest.approx(1.0)
     found = growth(made(rate, frequency, noise=0.3))
     assert (found.rate, found.frequency) == pytest.approx((rate, frequency), abs=4e-3)
-    assert 0.7 < found.share < 0.98
+    assert 0.7 < found.explained < 0.98
 
 
 def test_a_wave_of_a_run_is_that_of_its_box(small, tmp_path):

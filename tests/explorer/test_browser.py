@@ -211,7 +211,7 @@ def test_any_value_can_be_typed_and_taken_back(page, names):
         field.press("Enter")
         expect(failure).to_be_hidden()
         expect(page.locator("#says")).to_have_text(says)
-    expect(page.locator("main")).not_to_have_class("of-before")
+    expect(page.locator("main")).not_to_have_class("outdated")
 
 
 def place_of(route):
@@ -352,12 +352,12 @@ def test_regions_of_the_map_end_in_points_and_slanted_lines(page):
     # A boundary that is steep: each column has it somewhere else, those beside it not at all.
     def column(route):
         place = place_of(route)
-        share = 0.5 + (place - 0.5) / 0.1
+        fraction = 0.5 + (place - 0.5) / 0.1
         low, high = 0.5, 3**0.5 / 2
-        inside = 0.0 < share < 1.0
+        inside = 0.0 < fraction < 1.0
         part = {
-            "stops": [low + share * (high - low)] if inside else [],
-            "values": [2, 1] if inside else [2 if share >= 1.0 else 1],
+            "stops": [low + fraction * (high - low)] if inside else [],
+            "values": [2, 1] if inside else [2 if fraction >= 1.0 else 1],
         }
         none = {"stops": [], "values": [0]}
         parts = {"most": part, "families": part, "interior": none, "density": none, "hot": none}
@@ -648,12 +648,12 @@ def test_the_chosen_case_is_shown_as_long_as_it_holds(page):
     page.locator("#slope-slider").press("ArrowRight")
     expect(shown).to_have_text("glass-beads")
     page.locator("#e-slider").press("ArrowRight")
-    expect(shown).to_have_text("own numbers")
+    expect(shown).to_have_text("custom")
     expect(page.locator("#case-words")).to_be_empty()
 
 
-def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
-    def judged(route):
+def test_flows_of_the_curve_are_examined_one_by_one_and_no_more_is_said(page):
+    def examined(route):
         query = parse_qs(urlsplit(route.request.url).query)
         if "point" not in query:
             route.fulfill(json={"state": "unknown", "says": "not known", "waves": ""})
@@ -665,21 +665,21 @@ def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
 
     asked = []
     page.unroute("**/ask/stability?*")
-    page.route("**/ask/stability?*", judged)
+    page.route("**/ask/stability?*", examined)
     opened(page)
-    said = page.locator("#judged")
+    said = page.locator("#stability-words")
     expect(said).to_have_text(
         "Stability of 9 flows of the curve: × unstable (3), ■ stable (3), ? not known (3). "
-        "Between them nothing is known. Each was held against at least the waves of 11 to 91 d."
+        "Between them nothing is known. Each was examined for waves of at least 11 to 91 d."
     )
     assert len(set(asked)) == 9
-    assert page.locator("#curve .verdict").count() == 9
-    assert page.locator("#curve .verdict.stable title").all_text_contents() == ["it is stable"] * 3
-    page.locator("#judge").uncheck()
-    expect(said).to_have_text("Stability along the curve is not looked at.")
-    expect(page.locator("#curve .verdict")).to_have_count(0)
-    page.locator("#judge").check()
-    expect(page.locator("#curve .verdict")).to_have_count(9)
+    assert page.locator("#curve .stability-mark").count() == 9
+    assert page.locator("#curve .stability-mark.stable title").all_text_contents() == ["it is stable"] * 3
+    page.locator("#stability").uncheck()
+    expect(said).to_have_text("Stability along the curve is not examined.")
+    expect(page.locator("#curve .stability-mark")).to_have_count(0)
+    page.locator("#stability").check()
+    expect(page.locator("#curve .stability-mark")).to_have_count(9)
     page.locator("#Q-slider").press("ArrowRight")
     expect(said).to_contain_text("Stability of 9 flows")
     # Where the question cannot be posed, it is asked once.
@@ -905,7 +905,7 @@ def test_nothing_moves_that_one_has_not_moved(page, width):
             .observe({ type: 'layout-shift', buffered: true });"""
     )
     opened(page)
-    # What comes late is the stability of the flows, and judged flows of the curve.
+    # What comes late is the stability of the flows, and examined flows of the curve.
     page.wait_for_timeout(1500)
     sum_before = page.evaluate("shifts.reduce((sum, value) => sum + value, 0)")
     for place in range(380, 400, 4):
@@ -923,7 +923,7 @@ def test_nothing_moves_that_one_has_not_moved(page, width):
 def test_a_touch_reads_a_chart(tab):
     context = tab.context.browser.new_context(base_url=tab.address, has_touch=True)
     page = context.new_page()
-    opened(page, "?judge=")
+    opened(page, "?stability=")
     box = page.locator("#profile-T").bounding_box()
     page.touchscreen.tap(box["x"] + 60, box["y"] + 120)
     expect(page.locator("#profile-T .tip")).to_be_visible()
@@ -942,7 +942,7 @@ def test_the_button_writes_a_page_that_needs_no_server(page, tmp_path):
     assert 100_000 < path.stat().st_size < 2_000_000
     page.goto(path.as_uri())
     expect(page.locator("#says")).to_contain_text("Three flows share the flux Q = 3.42")
-    expect(page.locator("#kept-words")).to_contain_text(
+    expect(page.locator("#standalone-words")).to_contain_text(
         "grains: diameter 0.002 m, density 2500 kg/m^3", ignore_case=True
     )
     assert page.locator(".served:visible").count() == 0

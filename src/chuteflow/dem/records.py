@@ -1,4 +1,4 @@
-"""Measured flows as files: NetCDF 4 with CF attributes, and CSV, which other codes can write too.
+"""Files of measured flows: NetCDF 4 with CF attributes, and CSV, which other codes can write too.
 
 A CSV begins with lines "# name = value" for what is one number or text, and then has one row for each height, with the
 names of the columns before them. Needed are slope, e and the columns height, volume_fraction, velocity and
@@ -98,7 +98,7 @@ def _dataset(measured: Measured, history: str) -> Dataset:
     }
     told = {"units": "1", "long_name": "height above the plane of the bumps' centres", "positive": "up"}
     variables = {"height": Variable(("height",), measured.height, told)}
-    told = {"units": "1", "long_name": "share of the hold-up above, middle of a tenth"}
+    told = {"units": "1", "long_name": "fraction of the hold-up above, middle of a tenth"}
     variables["tenth"] = Variable(("tenth",), np.arange(1, 10) / 10.0 + 0.05, told)
     for name, values in measured.fields.items():
         variables |= _described(name, ("height",), values, measured.errors.get(name), FIELDS[name])
@@ -107,7 +107,7 @@ def _dataset(measured: Measured, history: str) -> Dataset:
     for name, value in measured.numbers.items():
         variables |= _described(name, (), value, measured.number_errors.get(name), NUMBERS[name])
     for name, one in measured.drifts.items():
-        about = ("", f"change of {name} over 300 time units, as a share of its mean")
+        about = ("", f"change of {name} over 300 time units, as a fraction of its mean")
         variables |= _described(f"{_DRIFT}{name}", (), one.value, one.error, about)
     return Dataset(variables, attributes)
 

@@ -28,7 +28,7 @@ Complex = NDArray[np.complex128]
 DIRECTIONS = {"along": 0, "across": 4}
 #: Columns of a file.
 _COLUMNS = ("t", "density_re", "density_im", "momentum_re", "momentum_im")
-#: Values that a wave is fitted to, at least.
+#: Smallest number of values to which a wave is fitted.
 _FEWEST = 20
 #: Frequencies that are tried first, in numbers of periods in the window.
 _PERIODS = np.arange(0.5, 12.1, 0.5)
@@ -61,12 +61,12 @@ class Amplitudes:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a wave grows: its ``rate`` and ``frequency``, and ``share``, of the mean squares of both amplitudes, what
-    one wave of constant rate explains."""
+    """The growth of a wave: its ``rate`` and ``frequency``, and ``explained``, the fraction of the mean squares of both
+    amplitudes that one wave of constant rate explains."""
 
     rate: float
     frequency: float
-    share: float
+    explained: float
 
 
 def amplitudes(run: Run, direction: str) -> Amplitudes:

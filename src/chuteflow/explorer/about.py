@@ -1,4 +1,4 @@
-"""What the page is told before it asks anything: what can be set, cases, and what quantities are called."""
+"""Metadata for the page: its controls, cases, quantities and their units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from chuteflow.steady.validity import WORDS
 
 
 def about(data: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """Controls, cases, words and quantities, as JSON has them, with ``data``, what was measured."""
+    """Controls, cases, limits of validity and quantities as JSON objects, with ``data``, the measurements."""
     return {
         "version": __version__,
         "data": list(data),

@@ -1,4 +1,4 @@
-"""Answers to the questions of the page, made in a process beside the server."""
+"""Answers to the questions of the page, computed in a worker process of the server."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from chuteflow.branches.results import Curve
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.contents import curve_content, limits_passed, short
+from chuteflow.explorer.heights import refine_heights
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
-from chuteflow.explorer.straight import straight_heights
 from chuteflow.io import contract
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
-#: Relative error allowed: far below what can be seen on a page. Exports are exact.
+#: Relative error allowed: too small to be visible on a page. Exports use the default tolerance.
 _VISIBLE = 1e-6
 _CURVE_POINTS = 90
 #: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
-#: they are halved until a straight line across each is off by this share of a field's largest value at most.
+#: they are halved until linear interpolation across each is accurate to this fraction of a field's largest value.
 _INTERVALS, _STRAIGHT = 16, 1e-3
-#: What else a computation may end with, which is no reason to end the process.
+#: Other errors of a computation, after which the process goes on.
 _FAILURES = (ArithmeticError, ValueError, LookupError)
 
 
@@ -121,11 +121,11 @@ def _place(flow: Flow) -> dict[str, Any]:
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
-    """Fields over height, at so many heights that straight lines between them show no corner that is not there."""
+    """Fields over height, at heights so close that linear interpolation between them is accurate."""
     highest = min(top, flow.interface_height)
     own = min(TOP * flow.centre_of_mass, highest)
     first = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
-    heights, (found,) = straight_heights([partial(fields, flow)], first, _STRAIGHT)
+    heights, (found,) = refine_heights([partial(fields, flow)], first, _STRAIGHT)
     return {"z": short(heights)} | {name: short(field) for name, field in zip(FIELDS, found, strict=True)}
 
 
@@ -143,7 +143,7 @@ def _limits(query: Query) -> Answer:
 
 @lru_cache(maxsize=4)
 def _drawn(chute: Chute) -> Curve:
-    """The curve as the page draws it; its flows are told by their numbers."""
+    """The curve as the page draws it; a query refers to its flows by their indices."""
     return curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
 
 
@@ -154,7 +154,7 @@ def _map(query: Query) -> Answer:
 
 
 def _stability(query: Query) -> Answer:
-    from chuteflow.explorer.growth import verdict
+    from chuteflow.explorer.growth import examine_stability
 
     at_flux = "branch" not in query
     chute, other = queries.read(query, other=("Q", "flow") if at_flux else ("branch", "point"), optional=GRAINS)
@@ -166,7 +166,7 @@ def _stability(query: Query) -> Answer:
         branches = _drawn(chute).branches
         branch = branches[queries.place("branch", other, len(branches))]
         flow = branch.flows[queries.place("point", other, len(branch.flows))]
-    known = verdict(flow)
+    known = examine_stability(flow)
     says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
     return _json(asdict(known) | {"says": says, "waves": waves})
 

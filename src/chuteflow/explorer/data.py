@@ -109,7 +109,7 @@ def _of_experiment(name: str, one: Experiment, *, known: bool) -> dict[str, Any]
 
 
 def _profile(height: Array, value: Array, error: Array | None) -> dict[str, list[float] | None]:
-    """Values at heights where there are some, thinned to what can be told apart; without errors None."""
+    """Values at the heights that have one, thinned to _MOST_HEIGHTS; ``error`` is None where errors are unknown."""
     there = np.flatnonzero(np.isfinite(value))
     there = there[:: max(1, -(-len(there) // _MOST_HEIGHTS))]
     errors = None if error is None else short(np.nan_to_num(np.broadcast_to(error, value.shape)[there]))

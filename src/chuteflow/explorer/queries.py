@@ -1,4 +1,4 @@
-"""What a request asks: the chute, the flux, the grains and the axes of its query, checked."""
+"""Queries of the page, parsed and checked: the chute, the flux, the grains and the axes of the map."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GRAINS = ("diameter", "density")
 
 @dataclass(frozen=True)
 class Control:
-    """A slider: its range and what it means. The number field beside it takes all that a chute allows."""
+    """A slider, its range and its meaning. The number field beside it accepts the whole range of a chute."""
 
     label: str
     symbol: str
@@ -36,33 +36,31 @@ class Control:
 
 
 CONTROLS = {
-    "slope": Control("Slope", "tan θ", 0.05, 0.7, False, "How steep the chute is: gravity along it drives the flow."),
-    "e": Control("Restitution", "e", 0.5, 1.0, False, "Share of speed that two grains keep as they collide; 1 is all."),
-    "ew": Control("Base restitution", "e_w", 0.0, 1.0, False, "Share of speed that a grain keeps as it hits the base."),
+    "slope": Control("Slope", "tan θ", 0.05, 0.7, False, "Slope of the chute; gravity along it drives the flow."),
+    "e": Control("Restitution", "e", 0.5, 1.0, False, "Of two colliding grains; 1 is elastic."),
+    "ew": Control("Base restitution", "e_w", 0.0, 1.0, False, "Of a grain that collides with the base; 1 is elastic."),
     "roughness": Control(
         "Roughness",
         "r",
         BY_KEY["roughness"].low,
         BY_KEY["roughness"].high,
         False,
-        "How deep a grain sinks between those glued to the base.",
+        "How deep a grain sinks between the grains fixed to the base.",
     ),
-    "Q": Control(
-        "Mass flux", "Q", *FLUX_RANGE, True, "Mass that passes per unit width and time, here in ρd√(gd cos θ)."
-    ),
+    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time, in ρd√(gd cos θ)."),
 }
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A list to choose from: the names that a chute knows, and what they mean."""
+    """A list of options: the names of a chute's setting, and their meanings."""
 
     label: str
     options: Mapping[str, str]
     meaning: str
 
 
-_SURFACES = {"free": "free, thinning out for ever", "interface": "interface, free flights above"}
+_SURFACES = {"free": "free, dilute at large heights", "interface": "interface, ballistic grains above"}
 _CLOSURES = {
     "lun": "Lun et al. 1984",
     "lun-fourier": "Lun, heat by Fourier's law alone",
@@ -73,17 +71,17 @@ _CLOSURES = {
 }
 CHOICES = {
     "surface": Choice(
-        "Surface", {name: _SURFACES.get(name, name) for name in SURFACES}, "What is assumed above the colliding grains."
+        "Surface", {name: _SURFACES.get(name, name) for name in SURFACES}, "The condition at the upper surface."
     ),
     "closure": Choice(
-        "Closure", {name: _CLOSURES.get(name, name) for name in LAWS}, "The law of stress and heat flux of the grains."
+        "Closure", {name: _CLOSURES.get(name, name) for name in LAWS}, "The constitutive law of stress and heat flux."
     ),
 }
 
 
 @dataclass(frozen=True)
 class Preset:
-    """A case worth looking at: what it sets of the page's state, and ``words`` on how its numbers are known."""
+    """A case: the part of the page's state that it sets, and ``words`` on the sources of its numbers."""
 
     title: str
     state: Mapping[str, float | str]
@@ -112,7 +110,7 @@ def cases() -> list[Preset]:
 
 
 def _state(one: Case) -> dict[str, float | str]:
-    """What a case says, by the names of the page's state; its grains have a diameter in mm."""
+    """The values of a case, by the names of the page's state; its grains have a diameter in mm."""
     said: dict[str, float | str] = {key: known.value for key, known in one.numbers.items()} | dict(one.names)
     grains = one.scales
     return said if grains is None else said | {"d": round(1e3 * grains.diameter, 12), "rho": grains.density}
@@ -121,7 +119,7 @@ def _state(one: Case) -> dict[str, float | str]:
 def _known(one: Case) -> str:
     numbers = {**one.numbers, **one.grains}
     guessed = [key for key, known in numbers.items() if known.how == GUESSED]
-    told = f" Guessed: {', '.join(guessed)}; put your own in their place." if guessed else ""
+    told = f" Guessed: {', '.join(guessed)}; replace them by your own values." if guessed else ""
     return f"{one.name}: {one.description}.{told}"
 
 
@@ -144,7 +142,7 @@ def read(query: Query, *, other: tuple[str, ...] = (), optional: tuple[str, ...]
     if missing:
         raise InputError(f"missing {', '.join(missing)}: for example {missing[0]}={_BASE.get(missing[0], 'slope')}")
     if runs_code(given["closure"]):
-        raise InputError("closure: a page may not run files: take one by its name, with parameters as name:key=value")
+        raise InputError("closure: a page runs no files: give the name of a law, with parameters as name:key=value")
     chute: dict[str, Any] = {
         long: given[short] if short in _DEFAULTS else number_in(short, given[short])
         for short, long in PARAMETERS.items()
@@ -190,10 +188,10 @@ def scales(given: Query) -> Scales | None:
 
 @dataclass(frozen=True)
 class ColumnAsked:
-    """A column of the map: the chute, the two parameters across and up, the place (share of the outer axis), and
+    """A column of the map: the chute, the two parameters across and up, the place (fraction of the outer axis), and
     values of the inner parameter (``near``) at which the classes of the columns beside it change.
 
-    A ``coarse`` column is one to look at while sliders move. The chute has the axes' own parameters at the low ends of
+    A ``coarse`` column is a preview while sliders move. The chute has the axes' own parameters at the low ends of
     their ranges.
     """
 
@@ -205,7 +203,7 @@ class ColumnAsked:
     coarse: bool = False
 
 
-#: Values near which the classes of a column are looked at closely, at most.
+#: Largest number of values near which a column is classified on a finer grid.
 MOST_NEAR = 32
 
 

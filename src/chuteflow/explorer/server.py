@@ -1,4 +1,4 @@
-"""The server of the explorer: the page, its parts, and its questions handed to the scheduler."""
+"""The server of the explorer: it serves the page and its files, and passes questions to the scheduler."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-#: Names of this machine that no other can reach it by.
+#: Names by which only this machine reaches itself.
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 PAGE = Path(__file__).parent / "page"
 
@@ -42,7 +42,7 @@ _HEADERS = {
 
 
 class Guard:
-    """Refuses requests for another host, from pages of another, longer than any of ours, or that change something."""
+    """Refuses requests for other hosts, from pages of other hosts, with long queries or with methods other than GET."""
 
     def __init__(self, app: ASGIApp, hosts: Sequence[str] | None) -> None:
         self._app = app
@@ -105,17 +105,17 @@ def application(
                 return _error(400, f"{repeated[:40]!r} is given several times: give it once")
             client = (request.client.host, request.client.port) if request.client else ("", 0)
             given = await scheduler.ask(question, request.query_params, client, request.is_disconnected)
-            return _response(given, told=request.headers.get("x-status") == "in-answer")
+            return _response(given, in_answer=request.headers.get("x-status") == "in-answer")
 
         return respond
 
-    async def told(_: Request) -> Response:
+    async def metadata(_: Request) -> Response:
         return JSONResponse(about(data))
 
     served = Starlette(
         routes=[
             Route("/", _page),
-            Route("/about", told),
+            Route("/about", metadata),
             *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
@@ -127,8 +127,8 @@ def application(
     return served
 
 
-def bound(host: str, port: int | None) -> socket.socket:
-    """A socket that listens at ``host``, at ``port`` or at 8765 or the next free one.
+def bind_socket(host: str, port: int | None) -> socket.socket:
+    """Open a socket that listens at ``host``, at ``port`` or at 8765 or the next free one.
 
     Raises:
         InputError: where that is impossible.
@@ -158,12 +158,12 @@ async def _page(_: Request) -> Response:
     return FileResponse(PAGE / "index.html")
 
 
-def _response(given: Answer, told: bool) -> Response:
-    """The answer with its status; one that is no success is ``told`` in the answer itself, if that is wanted.
+def _response(given: Answer, in_answer: bool) -> Response:
+    """The response with the status of the answer, or with status 200 and the status of a failure within it.
 
-    Browsers report every other status as an error of the page, which a refusal is not.
+    The page asks for the latter: browsers report every failure status as an error of the page.
     """
-    if told and given.status >= 400:
+    if in_answer and given.status >= 400:
         return JSONResponse(json.loads(given.body) | {"status": given.status})
     headers = {} if given.name is None else {"content-disposition": f'attachment; filename="{given.name}"'}
     if given.status == 503:

@@ -79,7 +79,7 @@ def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
 
 def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[str, Recovery | str]]:
     """For each closure the fit, or why there is none."""
-    from chuteflow.dem.recovery import recovered
+    from chuteflow.dem.recovery import recover
     from chuteflow.errors import ChuteflowError
     from chuteflow.steady.free import chosen_parameters
 
@@ -90,7 +90,7 @@ def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[
     found: list[tuple[str, Recovery | str]] = []
     for closure in closures:
         try:
-            found.append((closure, recovered(measured, closure, names)))
+            found.append((closure, recover(measured, closure, names)))
         except ChuteflowError as error:
             found.append((closure, str(error)))
     return found
@@ -147,7 +147,7 @@ def _content(found: Comparison) -> dict[str, Any]:
                 "theory": finite(one.theory),
                 "relative": finite(one.relative),
                 "relative_error": finite(one.error),
-                "verdict": one.verdict,
+                "verdict": one.agreement,
             }
             for one in rows
         ]

@@ -159,10 +159,10 @@ def _serve(given: Mapping[str, Any], query: str, data: list[dict[str, Any]]) -> 
     import uvicorn
 
     from chuteflow.explorer.connections import Connection, Server
-    from chuteflow.explorer.server import LOOPBACK, application, bound
+    from chuteflow.explorer.server import LOOPBACK, application, bind_socket
 
     address = given["host"] or "127.0.0.1"
-    listener = bound(address, given["port"])
+    listener = bind_socket(address, given["port"])
     number = listener.getsockname()[1]
     shown = f"[{address}]" if ":" in address else address
     page = f"http://{shown}:{number}/{query}"

@@ -1,4 +1,4 @@
-// What was measured, in experiments or simulations of single grains, drawn behind the flows.
+// Measurements and particle simulations, drawn behind the flows.
 import { byId, colour, escaped } from "./page.js";
 import { state } from "./state.js";
 import { factor } from "./units.js";
