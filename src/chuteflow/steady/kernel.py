@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.tabulate import find_piece
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, OFFSET, SHEAR, UPPER, WALL_SHEAR, WORK
 
 #: Gauss points of an element.
@@ -38,15 +39,7 @@ def closures(table: Any, x: float, f: Any) -> None:
     degree, pieces, width = coefficients.shape
     inner = math.log1p(x / OFFSET)
     c = math.log1p(inner)
-    position = min(max(c, 0.0), UPPER) * (pieces / UPPER)
-    i = min(int(position), pieces - 1)
-    t = 2.0 * (position - i) - 1.0
-    if len(edges) > 0:
-        while position < edges[i]:
-            i -= 1
-        while position >= edges[i + 1] and i + 1 < pieces:
-            i += 1
-        t = 2.0 * (position - edges[i]) / (edges[i + 1] - edges[i]) - 1.0
+    i, t = find_piece(edges, pieces, min(max(c, 0.0), UPPER) * (pieces / UPPER))
     for q in range(width):
         f[q] = coefficients[degree - 1, i, q]
     for d in range(degree - 2, -1, -1):
