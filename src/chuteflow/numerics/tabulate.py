@@ -120,7 +120,6 @@ class FunctionTable:
         m = len(value) // 2
         return value[:m], value[m:]
 
-
     def values(self, x: Array) -> Array:
         """The values alone, (m,) + x.shape."""
         if np.iscomplexobj(x) or np.iscomplexobj(self.coefficients):

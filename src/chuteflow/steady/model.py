@@ -74,7 +74,8 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
     density = _density_table(chosen, e, slope, b, tuple(closure_coordinate(scaled_breaks).tolist()))
     breaks_of_x = scaled_breaks
     if len(breaks):
-        breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(density.values(closure_coordinate(scaled_breaks))[0])))
+        log_ratio = density.values(closure_coordinate(scaled_breaks))[0]
+        breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
     nodes = _nodes(tuple(breaks_of_x.tolist()))
     ratio = _invert(density, nodes.argument)  # of room-scaled density to x
     scaled = nodes.argument * np.exp(ratio)
@@ -92,8 +93,8 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
 
 @dataclass(frozen=True, eq=False)
 class _Nodes:
-    """The points of a table, and there the ``argument``, x or the scaled density, and its derivative with respect to the
-    coordinate; arrays (k,)."""
+    """The points of a table, and there the ``argument``, x or the scaled density, and its derivative with respect to
+    the coordinate; arrays (k,)."""
 
     pieces: PieceNodes
     argument: Array
@@ -125,10 +126,7 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: tuple[fl
     gamma = antiderivative(nodes.pieces.table((rate * nodes.by_coordinate)[:, None]))
     (big_gamma,) = gamma.values(nodes.pieces.x)
     log_g, log_room = np.log(r.compressibility), np.log(room)
-    if np.all(b == 0.0):
-        log_ratio = log_g + log_room + big_gamma
-    else:
-        log_ratio = log_room + (log_g + big_gamma) / (1.0 - b)
+    log_ratio = log_room + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
     return nodes.pieces.table(np.stack([log_ratio, big_gamma], axis=-1))
 
 
