@@ -40,8 +40,13 @@ from chuteflow.trajectories.tables import (
     SPREAD,
 )
 
-#: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden.
-S_L, S_Y, S_T, S_H, S_G = range(5)
+#: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden; and while it is
+#: advanced, what these two are integrals of.
+S_L, S_Y, S_T, S_H, S_G, S_DH, S_DG = range(7)
+#: Columns that are kept.
+_KEPT = 5
+#: Columns of the expansion in the layer at a free surface, see :func:`expand_in_layer`.
+Y_1, L_2, Y_3, H_1, H_3, G_1, G_3 = range(7)
 #: Kinds of invariant regions; in the first B > 0, in the others B < 0.
 FREE, HOT, LOW_FLUX, COLD, BEYOND = range(5)
 #: Below this L nothing changes with the density, and distances count less.
@@ -50,10 +55,12 @@ DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 _COLDEST, _DENSEST = -8.0, 55.0
 #: Places between two states at which the residual is examined.
 _BETWEEN = 5
+#: Largest value of t (1 - t)^2 for t from 0 to 1.
+_HUMP = 4.0 / 27.0
+#: An overburden this many times smaller than one at which trajectories may meet the base is above all flows.
+_FAR = 2.0
 #: Trajectories inserted into one interval in one depth step at most.
 _MOST_INSERTED = 12
-#: The series at the surface of the half-line is used up to this fraction of T.
-START = 0.05
 #: Reasons why the curve ends.
 DONE, FULL = range(2)
 
@@ -67,8 +74,8 @@ def interpolate_table(values: Any, big_l: float, column: int) -> float:
 
 
 @compiled
-def _evaluate_derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, float]:
-    """dL/dp and dy/dp."""
+def _evaluate_derivative(values: Any, per_p: float, p: float, big_l: float, y: float) -> tuple[float, float]:
+    """dL/dp and dy/dp, where ``per_p`` is 1/p."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
     t = at - i
@@ -76,7 +83,8 @@ def _evaluate_derivative(values: Any, p: float, big_l: float, y: float) -> tuple
     k = values[i, COUPLED] + t * (values[i + 1, COUPLED] - values[i, COUPLED])
     net = values[i, NET] + t * (values[i + 1, NET] - values[i, NET])
     v = p * y * inverse - values[0, BETA]
-    return (1.0 - v) / p, net - y * (1.0 + 0.5 * (v + k * (1.0 - v))) / p
+    still = 1.0 - v
+    return still * per_p, net - y * (1.0 + 0.5 * (v + k * still)) * per_p
 
 
 @compiled
@@ -93,8 +101,8 @@ def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -
 
 @compiled
 def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
-    """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau and slope P sqrt(p) at its ends and
-    middle into ``out`` (3, 3)."""
+    """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau, slope P sqrt(p), p and 1/p at its ends
+    and middle into ``out`` (3, 5)."""
     half_tau = 0.5 * (math.log(after / over) + (after - over) / p_1)
     target = math.log(over) + over / p_1 + half_tau
     # The overburden in the middle of the step, by Newton's method in ln P.
@@ -104,60 +112,136 @@ def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: floa
         log_middle -= (log_middle + middle / p_1 - target) / (1.0 + middle / p_1)
     out[0, 0], out[1, 0], out[2, 0] = over, math.exp(log_middle), after
     for c in range(3):
+        p = out[c, 0] + p_s
         out[c, 1] = out[c, 0] / (1.0 + out[c, 0] / p_1)
-        out[c, 2] = slope * out[c, 0] * math.sqrt(out[c, 0] + p_s)
+        out[c, 2] = slope * out[c, 0] * math.sqrt(p)
+        out[c, 3], out[c, 4] = p, 1.0 / p
     return half_tau
 
 
 @compiled
-def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
+def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
     """One step of state ``j`` by the classical Runge-Kutta method in tau, for which :func:`_prepare_step` gives the
     lengths; integrals by Simpson."""
-    p_0, p_m, p_1 = lengths[0, 0] + p_s, lengths[1, 0] + p_s, lengths[2, 0] + p_s
+    p_0, p_m, p_1 = lengths[0, 3], lengths[1, 3], lengths[2, 3]
+    per_0, per_m, per_1 = lengths[0, 4], lengths[1, 4], lengths[2, 4]
     rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]
     big_l, y = curve[j, S_L], curve[j, S_Y]
-    l_1, y_1 = _evaluate_derivative(values, p_0, big_l, y)
-    l_2, y_2 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_0 * l_1, y + half_tau * rate_0 * y_1)
-    l_3, y_3 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_m * l_2, y + half_tau * rate_m * y_2)
-    l_m = big_l + half_tau * rate_m * l_3
-    l_4, y_4 = _evaluate_derivative(
-        values, p_1, big_l + 2.0 * half_tau * rate_m * l_3, y + 2.0 * half_tau * rate_m * y_3
-    )
+    step_0, step_m = half_tau * rate_0, half_tau * rate_m
+    l_1, y_1 = _evaluate_derivative(values, per_0, p_0, big_l, y)
+    l_2, y_2 = _evaluate_derivative(values, per_m, p_m, big_l + step_0 * l_1, y + step_0 * y_1)
+    l_3, y_3 = _evaluate_derivative(values, per_m, p_m, big_l + step_m * l_2, y + step_m * y_2)
+    l_m = big_l + step_m * l_3
+    l_4, y_4 = _evaluate_derivative(values, per_1, p_1, big_l + 2.0 * step_m * l_3, y + 2.0 * step_m * y_3)
     third = half_tau / 3.0
-    curve[j, S_L] = big_l + third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
+    big_l += third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
+    curve[j, S_L] = big_l
     curve[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
-    h_0, g_0 = _evaluate_integrands(values, lengths[0, 0], lengths[0, 2], big_l)
     h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
-    h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], curve[j, S_L])
-    curve[j, S_H] += third * (h_0 * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
-    curve[j, S_G] += third * (g_0 * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+    h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], big_l)
+    curve[j, S_H] += third * (curve[j, S_DH] * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
+    curve[j, S_G] += third * (curve[j, S_DG] * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+    curve[j, S_DH], curve[j, S_DG] = h_1, g_1
 
 
 @compiled
-def _start_at_surface(
+def _follow(out: Any, before: Any, i: int, q: int, half: float, rate: float, source: float) -> None:
+    """Entry ``i`` of function ``q``, whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
+    with half a step of ``half``; in balance at the first. ``before`` (7,) is what the next entry needs of this."""
+    out[i, q] = source / rate if i == 0 else (before[q] + half * source) / (1.0 + half * rate)
+    before[q] = out[i, q] + half * (source - rate * out[i, q])
+
+
+@compiled
+def expand_in_layer(values: Any, low: Any, high: Any, log_scale: float, deepest: float) -> tuple[Any, float]:
+    """The expansion in small P of the states near a free surface, in the layer of overburdens up to ``deepest`` whose
+    coldest trajectory has the heat potential ``log_scale`` at the surface; and an overburden above which none of them
+    meets a base with a heat flux between ``low`` and ``high`` (entries,).
+
+    With lambda = (1 + beta) ln P - theta_surface, which is L but for terms in P^2,
+
+        L = lambda + P^2 L_2,    y = P (Y_1 + P^2 Y_3),
+        integral of P dz = P^2 exp(-lambda) (H_1 + P^2 H_3),    of P du = slope P^(5/2) exp(-lambda/2) (G_1 + P^2 G_3)
+
+    with functions of lambda alone (entries, 7), whose derivatives follow by comparing powers of P.
+    """
+    beta = values[0, BETA]
+    last = int(((1.0 + beta) * math.log(deepest) - log_scale - LOW) * PER_UNIT) + 2
+    last = min(max(last, 1), ENTRIES - 1)
+    out = np.empty((last + 1, 7))
+    before = np.zeros(7)
+    half = 0.5 / ((1.0 + beta) * PER_UNIT)
+    first = deepest
+    for i in range(last + 1):
+        after, ahead = max(i - 1, 0), min(i + 1, ENTRIES - 1)
+        per = PER_UNIT / (ahead - after)
+        net_slope = per * (values[ahead, NET] - values[after, NET])
+        k_slope = per * (values[ahead, COUPLED] - values[after, COUPLED])
+        height_slope = per * (values[ahead, HEIGHT] - values[after, HEIGHT])
+        shearing_slope = per * (values[ahead, SHEARING] - values[after, SHEARING])
+        inverse, k = values[i, INVERSE], values[i, COUPLED]
+        heating = 0.5 * (k * (1.0 + beta) - beta)
+        _follow(out, before, i, Y_1, half, 2.0 + heating, values[i, NET])
+        y = out[i, Y_1]
+        _follow(out, before, i, L_2, half, 2.0, -y * inverse)
+        moved = out[i, L_2]
+        heated = y * inverse * (1.0 - k) + (1.0 + beta) * moved * k_slope
+        _follow(out, before, i, Y_3, half, 4.0 + heating, moved * net_slope - 0.5 * y * heated)
+        _follow(out, before, i, H_1, half, 1.0 - beta, values[i, HEIGHT])
+        _follow(out, before, i, H_3, half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]))
+        _follow(out, before, i, G_1, half, 2.0 - 0.5 * beta, values[i, SHEARING])
+        _follow(out, before, i, G_3, half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]))
+        least, most = min(low[i], low[ahead]), max(high[i], high[ahead])
+        nearest = 0.0 if least <= 0.0 <= most else min(abs(least), abs(most))
+        reached = math.exp((LOW + i / PER_UNIT + log_scale) / (1.0 + beta))
+        first = min(first, max(nearest / (_FAR * max(abs(out[i, Y_1]), 1e-300)), reached / _FAR))
+    return out, first
+
+
+@compiled
+def _between(table: Any, i: int, t: float, column: int) -> float:
+    """One function at the place ``t`` from entry ``i`` to the next."""
+    return table[i, column] + t * (table[i + 1, column] - table[i, column])
+
+
+@compiled
+def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s: float, out: Any, j: int) -> None:
+    """State ``j`` in the layer at a free surface, by its expansion."""
+    big_l = (1.0 + values[0, BETA]) * math.log(over) - theta_s
+    at = min(max((big_l - LOW) * PER_UNIT, 0.0), len(layer) - 1.000001)
+    i = int(at)
+    t, square, root = at - i, over * over, math.exp(-0.5 * big_l)
+    out[j, S_L] = big_l + square * (_between(layer, i, t, L_2))
+    y_1, y_3 = _between(layer, i, t, Y_1), _between(layer, i, t, Y_3)
+    h_1, h_3 = _between(layer, i, t, H_1), _between(layer, i, t, H_3)
+    g_1, g_3 = _between(layer, i, t, G_1), _between(layer, i, t, G_3)
+    out[j, S_Y] = over * (y_1 + square * y_3)
+    out[j, S_H] = square * root * root * (h_1 + square * h_3)
+    out[j, S_G] = slope * square * math.sqrt(over) * root * (g_1 + square * g_3)
+    out[j, S_DH], out[j, S_DG] = _evaluate_integrands(values, over, slope * over * math.sqrt(over), out[j, S_L])
+
+
+@compiled
+def states_in_layer(values: Any, layer: Any, overburden: Any, theta_s: float) -> Any:
+    """L and y, (k, 2), at overburdens (k,) in the layer at a free surface, of one trajectory."""
+    states = np.empty((len(overburden), 7))
+    for j in range(len(overburden)):
+        _start_in_layer(values, layer, 0.0, overburden[j], theta_s, states, j)
+    return states[:, :2]
+
+
+@compiled
+def _start_at_interface(
     values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, curve: Any, j: int
 ) -> None:
-    """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
-    if p_s == 0.0:
-        beta = values[0, BETA]
-        half = values[0, NET] / (2.0 - 0.5 * beta)
-        big_l = (1.0 + beta) * math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
-        v = over**2 * half * interpolate_table(values, big_l, INVERSE) - beta
-        net, k = interpolate_table(values, big_l, NET), interpolate_table(values, big_l, COUPLED)
-        share = 3.0 + 0.5 * beta
-        heating = v + k * (1.0 - v) + beta
-        curve[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
-        fraction = 1.0 / (1.0 - beta)
-    else:
-        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
-        l_p, y_p = _evaluate_derivative(values, p_s, big_l, y_s)
-        big_l += over * l_p
-        curve[j, S_Y] = y_s + over * y_p
-        fraction = 0.5
-    curve[j, S_L] = big_l
-    h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), big_l)
-    curve[j, S_H] = fraction * h * over
-    curve[j, S_G] = 0.5 * g * over
+    """State ``j`` a little below the interface, to first order."""
+    big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
+    l_p, y_p = _evaluate_derivative(values, 1.0 / p_s, p_s, big_l, y_s)
+    curve[j, S_L] = big_l + over * l_p
+    curve[j, S_Y] = y_s + over * y_p
+    h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), curve[j, S_L])
+    curve[j, S_H], curve[j, S_G] = 0.5 * h * over, 0.5 * g * over
+    curve[j, S_DH], curve[j, S_DG] = h, g
 
 
 @compiled
@@ -169,7 +253,7 @@ def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
         gained = max(bounds[i, NET_ABOVE], 0.0) - bounds[i, RELAX_ABOVE] * y / p
         return COLD if gained < bounds[i, CURVE_ABOVE] * y * y and y < bounds[i, BASE_ABOVE] else FREE
     net = bounds[i + 1, NET_LOW]
-    if net <= 0.0:
+    if net <= 0.0 or p * y <= bounds[i + 1, SPREAD]:
         return FREE
     bend, relax = max(bounds[i + 1, CURVE_HIGH], 1e-12), bounds[i + 1, RELAX_HIGH] / p
     least = min(y, 2.0 * net / (relax + math.sqrt(relax * relax + 4.0 * bend * net)))
@@ -248,7 +332,9 @@ def _measure_bend(curve: Any, j: int, n: int, connected: Any, length: Any, q: in
 
 
 @compiled
-def _hides_zeros(values: Any, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any) -> bool:
+def _hides_zeros(
+    values: Any, steepest: float, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any
+) -> bool:
     """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
     where it does along the cubic through the two states, or comes half of the way to it."""
     before, last = residual[j], residual[j + 1]
@@ -256,6 +342,11 @@ def _hides_zeros(values: Any, curve: Any, residual: Any, j: int, n: int, connect
     rise_l, rise_y = curve[j + 1, S_L] - curve[j, S_L], curve[j + 1, S_Y] - curve[j, S_Y]
     left_l, right_l = _measure_bend(curve, j, n, connected, length, S_L)
     left_y, right_y = _measure_bend(curve, j, n, connected, length, S_Y)
+    # The residual changes by no more than this between the two; t (1 - t)^2 is 4/27 at most.
+    most = abs(rise_y) + _HUMP * (abs(left_y) + abs(right_y))
+    most += steepest * (abs(rise_l) + _HUMP * (abs(left_l) + abs(right_l)))
+    if 2.0 * most <= least and (before >= 0.0) == (last >= 0.0):
+        return False
     changes = 0
     nearest = least
     for c in range(1, _BETWEEN + 1):
@@ -310,7 +401,9 @@ def integrate(
     p_s: float,
     y_s: float,
     p_1: float,
-    start_at_most: float,
+    layer: Any,
+    layer_depth: float,
+    steepest: float,
     overburden: Any,
     log_t: Any,
     theta_s: Any,
@@ -321,7 +414,9 @@ def integrate(
     largest_flux: float,
 ) -> tuple[Any, ...]:
     """Integrate the curve of states down the depth steps ``overburden`` (R,) from surface temperatures ``log_t`` (C,)
-    ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``.
+    ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``. Down to
+    ``layer_depth`` the states are those of the expansion ``layer``; ``steepest`` is the largest slope of the heat flux
+    of the base over L.
 
     Returns the states of all depth steps (N, 5), the place in the step before from which each came (N,), between two
     states where it was inserted, whether the curve continues from each to the next (N,), the first position of each
@@ -329,7 +424,7 @@ def integrate(
     the curve ended.
     """
     n = len(log_t)
-    states = np.empty((64 * n + 1024, 5))
+    states = np.empty((64 * n + 1024, _KEPT))
     came_from = np.empty(len(states))
     goes_on = np.empty(len(states), np.bool_)
     first = np.zeros(len(overburden) + 1, np.int64)
@@ -338,9 +433,8 @@ def integrate(
     status = DONE
 
     # The curve: n positions in use of these.
-    curve = np.empty((4 * n, 5))
+    curve = np.empty((4 * n, 7))
     theta = np.empty(len(curve))  # heat potential at the surface
-    in_series = np.zeros(len(curve), np.bool_)
     stopped = np.zeros(len(curve), np.bool_)  # no longer advanced
     connected = np.ones(len(curve), np.bool_)  # whether the curve continues to the next position
     region = np.empty(len(curve), np.int64)
@@ -351,8 +445,8 @@ def integrate(
     previous = np.full(len(curve), -1, np.int64)
     shifted = np.empty(len(curve), np.int64)
     n_inserted = np.empty(len(curve), np.int64)  # how many to insert after a position
-    inserted = np.empty((len(curve), 5))
-    lengths = np.empty((3, 3))
+    inserted = np.empty((len(curve), 7))
+    lengths = np.empty((3, 5))
     theta[:n] = theta_s
     curve[:n, S_T] = log_t
     # The outermost trajectories tell where branches lead out of the range.
@@ -363,15 +457,14 @@ def integrate(
         p = over + p_s
         # Advance.
         half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths) if step > 0 else 0.0
+        in_layer = p_s == 0.0 and (step == 0 or over <= layer_depth)
         for j in range(n):
-            if step == 0 or in_series[j]:
-                log_scale = theta[j] / (1.0 + values[0, BETA])
-                in_series[j] = p_s == 0.0 and (step == 0 or over <= min(START * math.exp(log_scale), start_at_most))
-                if step == 0 or in_series[j]:
-                    _start_at_surface(values, slope, p_s, y_s, theta[j], over, curve, j)
-                    continue
-            if not stopped[j]:
-                _advance(values, p_s, half_tau, lengths, curve, j)
+            if in_layer:
+                _start_in_layer(values, layer, slope, over, theta[j], curve, j)
+            elif step == 0:
+                _start_at_interface(values, slope, p_s, y_s, theta[j], over, curve, j)
+            elif not stopped[j]:
+                _advance(values, half_tau, lengths, curve, j)
                 if not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST:
                     curve[j, S_Y] = _COLDEST / per_flux
                     curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
@@ -396,8 +489,8 @@ def integrate(
             if length[j] > delta:
                 n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
                 limited = length[j] > 2.0 * delta * (n_inserted[j] + 1)
-            elif not in_series[j]:
-                doubtful = _hides_zeros(values, curve, residual, j, n, connected, length)
+            else:
+                doubtful = _hides_zeros(values, steepest, curve, residual, j, n, connected, length)
                 n_inserted[j] = 1 if doubtful and length[j] > finest else 0
                 limited = doubtful and length[j] <= finest
             if limited:
@@ -423,12 +516,7 @@ def integrate(
                     _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
                     k += 1
             if m > len(curve):
-                curve, theta, in_series, stopped = (
-                    _grow(curve, m),
-                    _grow(theta, m),
-                    _grow(in_series, m),
-                    _grow(stopped, m),
-                )
+                curve, theta, stopped = _grow(curve, m), _grow(theta, m), _grow(stopped, m)
                 connected, region, residual, length = (
                     _grow(connected, m),
                     _grow(region, m),
@@ -443,10 +531,9 @@ def integrate(
                     at -= 1
                     k -= 1
                     t = (c + 1.0) / (n_inserted[j] + 1.0)
-                    for q in range(5):
+                    for q in range(7):
                         curve[at, q] = inserted[k, q]
                     theta[at] = theta[j] + t * (theta[shifted[j + 1]] - theta[j])
-                    in_series[at] = in_series[j] and in_series[shifted[j + 1]]
                     stopped[at] = False
                     connected[at] = True
                     region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
@@ -454,14 +541,14 @@ def integrate(
                     came_from[total + at] = previous[j] + t * (previous[j + 1] - previous[j])
                 at -= 1
                 shifted[j] = at
-                for q in range(5):
+                for q in range(7):
                     curve[at, q] = curve[j, q]
-                theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
+                theta[at], stopped[at] = theta[j], stopped[j]
                 connected[at], region[at], residual[at] = connected[j], region[j], residual[j]
         for j in range(n):
             came_from[total + shifted[j]] = previous[j]
         for j in range(m):
-            for q in range(5):
+            for q in range(_KEPT):
                 states[total + j, q] = curve[j, q]
             goes_on[total + j] = connected[j]
         first[step] = total
@@ -472,9 +559,9 @@ def integrate(
             ahead = j + 1 < m and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
             if joined or ahead:
                 if at < j:
-                    for q in range(5):
+                    for q in range(7):
                         curve[at, q] = curve[j, q]
-                    theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
+                    theta[at], stopped[at] = theta[j], stopped[j]
                 connected[at] = ahead
                 previous[at] = total + j
                 at += 1
@@ -623,7 +710,20 @@ def trace_back(states: Any, came_from: Any, place: float, step: int) -> Any:
 
 
 @compiled
-def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
+def _passed_above(values: Any, bounds: Any, p_s: float, big_l: float) -> tuple[float, float]:
+    """The least and the largest net loss on a trajectory above where the curve starts with L on it: below a free
+    surface L rises to there, and at an interface it starts there."""
+    net = interpolate_table(values, big_l, NET)
+    if p_s > 0.0:
+        return net, net
+    i = int(min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001))
+    return min(net, bounds[i, NET_LOW]), max(net, bounds[i, NET_HIGH])
+
+
+@compiled
+def bound_extremes(
+    values: Any, bounds: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any
+) -> Any:
     """Bounds of the least and the largest net loss, and of the largest 1 - p dL/dp, of each trajectory down to each
     state: lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a
     trajectory lies between its neighbours, and its extrema between theirs."""
@@ -635,7 +735,11 @@ def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_f
             turn = p * states[i, S_Y] * interpolate_table(values, states[i, S_L], INVERSE) - values[0, BETA]
             out[i, 0] = out[i, 1] = out[i, 3] = out[i, 4] = net
             out[i, 2] = out[i, 5] = turn
-            if step > 0:
+            if step == 0:
+                low_net, high_net = _passed_above(values, bounds, p_s, states[i, S_L])
+                out[i, 0] = out[i, 3] = low_net
+                out[i, 1] = out[i, 4] = high_net
+            else:
                 one = int(came_from[i])
                 other = one + 1 if came_from[i] > one else one
                 for low in (0, 3):
@@ -647,13 +751,14 @@ def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_f
 
 @compiled
 def find_extremes(
-    values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, steps: Any
+    values: Any, bounds: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, steps: Any
 ) -> Any:
     """The least and the largest net loss, and the largest 1 - p dL/dp, down to ``places`` (k,) in ``steps``, (k, 3)."""
     out = np.empty((len(places), 3))
     for k in range(len(places)):
         back = trace_back(states, came_from, places[k], steps[k])
-        out[k, 0], out[k, 1], out[k, 2] = np.inf, -np.inf, -np.inf
+        out[k, 0], out[k, 1] = _passed_above(values, bounds, p_s, back[0, 0])
+        out[k, 2] = -np.inf
         for step in range(steps[k] + 1):
             net = interpolate_table(values, back[step, 0], NET)
             p = overburden[step] + p_s

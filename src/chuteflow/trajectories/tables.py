@@ -38,12 +38,13 @@ class Tables:
     from both sides, A = (1 - k)/(2 a) from both sides, the largest c = 1 + ((1 + beta) k - beta)/2, the largest
     (1 + beta) a, b from both sides) and over all larger L (the largest net, the smallest A, the largest c, the
     smallest b). ``rate`` is the fastest
-    rate of y in p, and ``scale`` the size of heat fluxes y.
+    rate of y in p, ``steepest`` the largest slope of b, and ``scale`` the size of heat fluxes y.
     """
 
     values: Array
     bounds: Array
     rate: float
+    steepest: float
     scale: float
 
 
@@ -63,18 +64,18 @@ def _closures(table: FunctionTable) -> Array:
 def tables(model: Model) -> Tables:
     """The tables of ``model``."""
     f = _closures(model.table)
-    values, bounds, rate = _tabulate(f, model.base_flux(f), float(model.slope), float(model.beta))
-    return Tables(values, bounds, rate, model.flux_scale)
+    values, bounds, rate, steepest = _tabulate(f, model.base_flux(f), float(model.slope), float(model.beta))
+    return Tables(values, bounds, rate, steepest, model.flux_scale)
 
 
 @compiled
-def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, float]:
-    """Functions, bounds and the fastest rate, see :class:`Tables`, from the closures (8, entries) and the heat flux
-    (entries,) that the base would give."""
+def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, float, float]:
+    """Functions, bounds, the fastest rate and the largest slope of b, see :class:`Tables`, from the closures (8,
+    entries) and the heat flux (entries,) that the base would give."""
     entries = len(base)
     values = np.empty((entries, 7))
     bounds = np.empty((entries, 12))
-    rate = 0.0
+    rate = steepest = 0.0
     net_low = curve_low = base_low = np.inf
     net_high = curve_high = base_high = relax_high = spread = -np.inf
     for i in range(entries):
@@ -94,7 +95,8 @@ def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, f
         base_low, base_high = min(base_low, base[i]), max(base_high, base[i])
         relax_high = max(relax_high, relax)
         spread = max(spread, conduction * (1.0 + beta))
-        rate = max(rate, math.sqrt(2.0 * abs(net) / conduction))
+        rate = max(rate, 2.0 * abs(net) / conduction)
+        steepest = max(steepest, abs(base[i] - base[max(i - 1, 0)]) * PER_UNIT)
         bounds[i, NET_LOW], bounds[i, NET_HIGH] = net_low, net_high
         bounds[i, CURVE_LOW], bounds[i, CURVE_HIGH] = curve_low, curve_high
         bounds[i, RELAX_HIGH], bounds[i, SPREAD] = relax_high, spread
@@ -106,7 +108,7 @@ def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, f
             bounds[i, highest] = max(bounds[i, highest], bounds[i + 1, highest])
         for lowest in (CURVE_ABOVE, BASE_ABOVE):
             bounds[i, lowest] = min(bounds[i, lowest], bounds[i + 1, lowest])
-    return values, bounds, rate
+    return values, bounds, math.sqrt(rate), steepest
 
 
 def base_table(model: Model) -> Array:
