@@ -57,6 +57,8 @@ _COLDEST, _DENSEST = -8.0, 55.0
 _BETWEEN = 5
 #: Largest value of t (1 - t)^2 for t from 0 to 1.
 _HUMP = 4.0 / 27.0
+#: That times the largest r^2/(1 + r) for a ratio r of neighbouring lengths up to 2.
+_BEND = _HUMP * 4.0 / 3.0
 #: An overburden this many times smaller than one at which trajectories may meet the base is above all flows.
 _FAR = 2.0
 #: Trajectories inserted into one interval in one depth step at most.
@@ -120,28 +122,38 @@ def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: floa
 
 
 @compiled
-def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
-    """One step of state ``j`` by the classical Runge-Kutta method in tau, for which :func:`_prepare_step` gives the
-    lengths; integrals by Simpson."""
+def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, stopped: Any, slopes: Any) -> None:
+    """One step of the first ``n`` states but the ``stopped`` ones by the classical Runge-Kutta method in tau, for which
+    :func:`_prepare_step` gives the lengths; integrals by Simpson.
+
+    Stage by stage: the processor then works on several states at once. ``slopes`` (n, 6) is space for the stages.
+    """
     p_0, p_m, p_1 = lengths[0, 3], lengths[1, 3], lengths[2, 3]
     per_0, per_m, per_1 = lengths[0, 4], lengths[1, 4], lengths[2, 4]
     rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]
-    big_l, y = curve[j, S_L], curve[j, S_Y]
-    step_0, step_m = half_tau * rate_0, half_tau * rate_m
-    l_1, y_1 = _evaluate_derivative(values, per_0, p_0, big_l, y)
-    l_2, y_2 = _evaluate_derivative(values, per_m, p_m, big_l + step_0 * l_1, y + step_0 * y_1)
-    l_3, y_3 = _evaluate_derivative(values, per_m, p_m, big_l + step_m * l_2, y + step_m * y_2)
-    l_m = big_l + step_m * l_3
-    l_4, y_4 = _evaluate_derivative(values, per_1, p_1, big_l + 2.0 * step_m * l_3, y + 2.0 * step_m * y_3)
-    third = half_tau / 3.0
-    big_l += third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
-    curve[j, S_L] = big_l
-    curve[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
-    h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
-    h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], big_l)
-    curve[j, S_H] += third * (curve[j, S_DH] * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
-    curve[j, S_G] += third * (curve[j, S_DG] * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
-    curve[j, S_DH], curve[j, S_DG] = h_1, g_1
+    step_0, step_m, third = half_tau * rate_0, half_tau * rate_m, half_tau / 3.0
+    for j in range(n):
+        slopes[j, 0], slopes[j, 1] = _evaluate_derivative(values, per_0, p_0, curve[j, S_L], curve[j, S_Y])
+    for j in range(n):
+        big_l, y = curve[j, S_L] + step_0 * slopes[j, 0], curve[j, S_Y] + step_0 * slopes[j, 1]
+        slopes[j, 2], slopes[j, 3] = _evaluate_derivative(values, per_m, p_m, big_l, y)
+    for j in range(n):
+        big_l, y = curve[j, S_L] + step_m * slopes[j, 2], curve[j, S_Y] + step_m * slopes[j, 3]
+        slopes[j, 4], slopes[j, 5] = _evaluate_derivative(values, per_m, p_m, big_l, y)
+    for j in range(n):
+        if stopped[j]:
+            continue
+        big_l, y, l_3, y_3 = curve[j, S_L], curve[j, S_Y], slopes[j, 4], slopes[j, 5]
+        l_m = big_l + step_m * l_3
+        l_4, y_4 = _evaluate_derivative(values, per_1, p_1, big_l + 2.0 * step_m * l_3, y + 2.0 * step_m * y_3)
+        big_l += third * (rate_0 * slopes[j, 0] + 2.0 * rate_m * (slopes[j, 2] + l_3) + rate_1 * l_4)
+        curve[j, S_L] = big_l
+        curve[j, S_Y] = y + third * (rate_0 * slopes[j, 1] + 2.0 * rate_m * (slopes[j, 3] + y_3) + rate_1 * y_4)
+        h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
+        h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], big_l)
+        curve[j, S_H] += third * (curve[j, S_DH] * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
+        curve[j, S_G] += third * (curve[j, S_DG] * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+        curve[j, S_DH], curve[j, S_DG] = h_1, g_1
 
 
 @compiled
@@ -318,17 +330,23 @@ def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, 
 
 
 @compiled
-def _measure_bend(curve: Any, j: int, n: int, connected: Any, length: Any, q: int) -> tuple[float, float]:
-    """How much more quantity ``q`` changes by its slopes at position j of the curve, and at the next, than between
-    them: the slopes are those of parabolas through three positions."""
+def _is_far_from_zero(steepest: float, curve: Any, least: float, j: int, n: int, connected: Any, length: Any) -> bool:
+    """Whether along the cubic between position j of the curve and the next the residual certainly changes by less than
+    half of ``least``, its smaller size at the two; told from neighbours that are not much nearer."""
     d = length[j]
-    rise = curve[j + 1, q] - curve[j, q]
-    left = right = 0.0
+    most_y, most_l = abs(curve[j + 1, S_Y] - curve[j, S_Y]), abs(curve[j + 1, S_L] - curve[j, S_L])
+    most_y, most_l = (1.0 + 2.0 * _HUMP) * most_y, (1.0 + 2.0 * _HUMP) * most_l
     if j > 0 and connected[j - 1]:
-        left = ((curve[j, q] - curve[j - 1, q]) * d / length[j - 1] - rise) * d / (d + length[j - 1])
+        if length[j - 1] < 0.5 * d:
+            return False
+        most_y += _BEND * abs(curve[j, S_Y] - curve[j - 1, S_Y])
+        most_l += _BEND * abs(curve[j, S_L] - curve[j - 1, S_L])
     if j + 2 < n and connected[j + 1]:
-        right = ((curve[j + 2, q] - curve[j + 1, q]) * d / length[j + 1] - rise) * d / (d + length[j + 1])
-    return left, right
+        if length[j + 1] < 0.5 * d:
+            return False
+        most_y += _BEND * abs(curve[j + 2, S_Y] - curve[j + 1, S_Y])
+        most_l += _BEND * abs(curve[j + 2, S_L] - curve[j + 1, S_L])
+    return 2.0 * (most_y + steepest * most_l) <= least
 
 
 @compiled
@@ -336,17 +354,26 @@ def _hides_zeros(
     values: Any, steepest: float, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any
 ) -> bool:
     """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
-    where it does along the cubic through the two states, or comes half of the way to it."""
+    where it does along the cubic through the two states, or comes half of the way to it. The slopes of the cubic are
+    those of parabolas through three positions; ``steepest`` is the largest slope of the flux of the base."""
     before, last = residual[j], residual[j + 1]
     least = min(abs(before), abs(last))
-    rise_l, rise_y = curve[j + 1, S_L] - curve[j, S_L], curve[j + 1, S_Y] - curve[j, S_Y]
-    left_l, right_l = _measure_bend(curve, j, n, connected, length, S_L)
-    left_y, right_y = _measure_bend(curve, j, n, connected, length, S_Y)
-    # The residual changes by no more than this between the two; t (1 - t)^2 is 4/27 at most.
-    most = abs(rise_y) + _HUMP * (abs(left_y) + abs(right_y))
-    most += steepest * (abs(rise_l) + _HUMP * (abs(left_l) + abs(right_l)))
-    if 2.0 * most <= least and (before >= 0.0) == (last >= 0.0):
+    alike = (before >= 0.0) == (last >= 0.0)
+    if alike and _is_far_from_zero(steepest, curve, least, j, n, connected, length):
         return False
+    rise_l, rise_y = curve[j + 1, S_L] - curve[j, S_L], curve[j + 1, S_Y] - curve[j, S_Y]
+    # How much more L and y change by their slopes at the one and the other end than between them.
+    left_l = left_y = right_l = right_y = 0.0
+    if j > 0 and connected[j - 1]:
+        ratio = length[j] / length[j - 1]
+        weight = ratio / (1.0 + ratio)
+        left_l = ((curve[j, S_L] - curve[j - 1, S_L]) * ratio - rise_l) * weight
+        left_y = ((curve[j, S_Y] - curve[j - 1, S_Y]) * ratio - rise_y) * weight
+    if j + 2 < n and connected[j + 1]:
+        ratio = length[j] / length[j + 1]
+        weight = ratio / (1.0 + ratio)
+        right_l = ((curve[j + 2, S_L] - curve[j + 1, S_L]) * ratio - rise_l) * weight
+        right_y = ((curve[j + 2, S_Y] - curve[j + 1, S_Y]) * ratio - rise_y) * weight
     changes = 0
     nearest = least
     for c in range(1, _BETWEEN + 1):
@@ -358,7 +385,7 @@ def _hides_zeros(
         nearest = min(nearest, abs(here))
         before = here
     changes += int((last >= 0.0) != (before >= 0.0))
-    if (residual[j] >= 0.0) == (last >= 0.0):
+    if alike:
         return changes > 0 or nearest < 0.5 * least
     return changes > 1
 
@@ -447,6 +474,7 @@ def integrate(
     n_inserted = np.empty(len(curve), np.int64)  # how many to insert after a position
     inserted = np.empty((len(curve), 7))
     lengths = np.empty((3, 5))
+    slopes = np.empty((len(curve), 6))
     theta[:n] = theta_s
     curve[:n, S_T] = log_t
     # The outermost trajectories tell where branches lead out of the range.
@@ -455,17 +483,18 @@ def integrate(
     for step in range(len(overburden)):
         over = overburden[step]
         p = over + p_s
-        # Advance.
-        half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths) if step > 0 else 0.0
-        in_layer = p_s == 0.0 and (step == 0 or over <= layer_depth)
-        for j in range(n):
-            if in_layer:
+        if p_s == 0.0 and (step == 0 or over <= layer_depth):
+            for j in range(n):
                 _start_in_layer(values, layer, slope, over, theta[j], curve, j)
-            elif step == 0:
+        elif step == 0:
+            for j in range(n):
                 _start_at_interface(values, slope, p_s, y_s, theta[j], over, curve, j)
-            elif not stopped[j]:
-                _advance(values, half_tau, lengths, curve, j)
-                if not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST:
+        else:
+            slopes = _grow(slopes, n)
+            half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths)
+            _advance(values, half_tau, lengths, curve, n, stopped, slopes)
+            for j in range(n):
+                if not stopped[j] and (not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST):
                     curve[j, S_Y] = _COLDEST / per_flux
                     curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
                     if not math.isfinite(curve[j, S_H]):
@@ -540,6 +569,8 @@ def integrate(
                     residual[at] = inserted[k, S_Y] - interpolate_table(values, inserted[k, S_L], BASE)
                     came_from[total + at] = previous[j] + t * (previous[j + 1] - previous[j])
                 at -= 1
+                if at == j:
+                    break  # nothing was inserted before
                 shifted[j] = at
                 for q in range(7):
                     curve[at, q] = curve[j, q]
