@@ -234,6 +234,12 @@ def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s:
 
 
 @compiled
+def _start_all_in_layer(values: Any, layer: Any, slope: float, over: float, theta: Any, curve: Any, n: int) -> None:
+    for j in range(n):
+        _start_in_layer(values, layer, slope, over, theta[j], curve, j)
+
+
+@compiled
 def states_in_layer(values: Any, layer: Any, overburden: Any, theta_s: float) -> Any:
     """L and y, (k, 2), at overburdens (k,) in the layer at a free surface, of one trajectory."""
     states = np.empty((len(overburden), 7))
@@ -243,17 +249,18 @@ def states_in_layer(values: Any, layer: Any, overburden: Any, theta_s: float) ->
 
 
 @compiled
-def _start_at_interface(
-    values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, curve: Any, j: int
+def _start_all_at_interface(
+    values: Any, slope: float, p_s: float, y_s: float, theta: Any, over: float, curve: Any, n: int
 ) -> None:
-    """State ``j`` a little below the interface, to first order."""
-    big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
-    l_p, y_p = _evaluate_derivative(values, 1.0 / p_s, p_s, big_l, y_s)
-    curve[j, S_L] = big_l + over * l_p
-    curve[j, S_Y] = y_s + over * y_p
-    h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), curve[j, S_L])
-    curve[j, S_H], curve[j, S_G] = 0.5 * h * over, 0.5 * g * over
-    curve[j, S_DH], curve[j, S_DG] = h, g
+    """The states a little below the interface, to first order."""
+    for j in range(n):
+        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta[j]
+        l_p, y_p = _evaluate_derivative(values, 1.0 / p_s, p_s, big_l, y_s)
+        curve[j, S_L] = big_l + over * l_p
+        curve[j, S_Y] = y_s + over * y_p
+        h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), curve[j, S_L])
+        curve[j, S_H], curve[j, S_G] = 0.5 * h * over, 0.5 * g * over
+        curve[j, S_DH], curve[j, S_DG] = h, g
 
 
 @compiled
@@ -420,6 +427,145 @@ def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
         links[two, 0 if links[two, 0] < 0 else 1] = one
 
 
+# What follows works on the positions of the curve: of the first n of the arrays, ``theta`` is the heat potential at the
+# surface, ``stopped`` whether a state is no longer advanced, ``connected`` whether the curve continues to the next,
+# ``came`` the place among the states of the step before, ``region`` the invariant region, ``residual`` B, and ``length``
+# the distance from the next. They are own functions since numba counts references to arrays that are assigned anew.
+
+
+@compiled
+def _stop(curve: Any, n: int, stopped: Any, coldest: float) -> None:
+    """Stop the states that are too cold or too dense to be advanced."""
+    for j in range(n):
+        if not stopped[j] and (not (curve[j, S_Y] > coldest) or curve[j, S_L] > _DENSEST):
+            curve[j, S_Y] = coldest
+            curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
+            if not math.isfinite(curve[j, S_H]):
+                curve[j, S_H] = 1e300
+            if not math.isfinite(curve[j, S_G]):
+                curve[j, S_G] = 1e300
+            stopped[j] = True
+
+
+@compiled
+def _examine(
+    values: Any, bounds: Any, p: float, per_flux: float, limits: tuple[float, float, float],
+    curve: Any, n: int, stopped: Any, region: Any, residual: Any, length: Any,
+) -> None:  # fmt: skip
+    """Regions, residuals and lengths."""
+    for j in range(n):
+        region[j] = COLD if stopped[j] else _find_region_or_limit(bounds, p, curve, j, limits)
+        residual[j] = curve[j, S_Y] - interpolate_table(values, curve[j, S_L], BASE)
+    for j in range(n - 1):
+        length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
+
+
+@compiled
+def _plan_insertions(
+    values: Any, steepest: float, delta: float, finest: float,
+    curve: Any, n: int, connected: Any, region: Any, residual: Any, length: Any, n_inserted: Any, limited: Any,
+) -> tuple[int, int, int]:  # fmt: skip
+    """How many states to insert after each position, and whether that is not enough, so that the cell is undecided; in
+    all how many to insert, cells examined, and undecided."""
+    extra = cells = undecided = 0
+    for j in range(n):
+        n_inserted[j], limited[j] = 0, False
+        if j + 1 == n or not connected[j] or (region[j] != FREE and region[j] == region[j + 1]):
+            continue
+        cells += 1
+        if length[j] > delta:
+            n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
+            limited[j] = length[j] > 2.0 * delta * (n_inserted[j] + 1)
+        elif _hides_zeros(values, steepest, curve, residual, j, n, connected, length):
+            n_inserted[j] = 1 if length[j] > finest else 0
+            limited[j] = length[j] <= finest
+        undecided += int(limited[j])
+        extra += n_inserted[j]
+    return extra, cells, undecided
+
+
+@compiled
+def _interpolate_planned(curve: Any, n: int, connected: Any, length: Any, n_inserted: Any, inserted: Any) -> None:
+    """The states to insert, in order."""
+    k = 0
+    for j in range(n):
+        for c in range(n_inserted[j]):
+            _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
+            k += 1
+
+
+@compiled
+def _insert(
+    bounds: Any, p: float, limits: tuple[float, float, float], n_inserted: Any, inserted: Any, extra: int,
+    curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
+) -> None:  # fmt: skip
+    """Insert the ``extra`` states; from the end of the curve, so that nothing is overwritten before it is moved."""
+    at, k = n + extra, extra
+    ahead = at  # where the position after the present one is now
+    for j in range(n - 1, -1, -1):
+        for c in range(n_inserted[j] - 1, -1, -1):
+            at -= 1
+            k -= 1
+            t = (c + 1.0) / (n_inserted[j] + 1.0)
+            for q in range(7):
+                curve[at, q] = inserted[k, q]
+            theta[at] = theta[j] + t * (theta[ahead] - theta[j])
+            came[at] = came[j] + t * (came[ahead] - came[j])
+            stopped[at] = False
+            connected[at] = True
+            region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
+        at -= 1
+        if at == j:
+            break  # nothing is inserted before
+        ahead = at
+        for q in range(7):
+            curve[at, q] = curve[j, q]
+        theta[at], came[at], stopped[at], connected[at], region[at] = (
+            theta[j],
+            came[j],
+            stopped[j],
+            connected[j],
+            region[j],
+        )
+
+
+@compiled
+def _record(
+    states: Any, came_from: Any, goes_on: Any, total: int,
+    curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
+) -> int:  # fmt: skip
+    """Keep the states, after ``total`` others. Then close the curve where both ends of an interval lie in one invariant
+    region, and drop what is closed in; how many positions are left."""
+    at = 0
+    joined = False  # to the position before
+    for j in range(n):
+        for q in range(_KEPT):
+            states[total + j, q] = curve[j, q]
+        came_from[total + j], goes_on[total + j] = came[j], connected[j]
+        ahead = j + 1 < n and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
+        if joined or ahead:
+            if at < j:
+                for q in range(7):
+                    curve[at, q] = curve[j, q]
+                theta[at], stopped[at] = theta[j], stopped[j]
+            connected[at] = ahead
+            came[at] = total + j
+            at += 1
+        joined = ahead
+    return at
+
+
+@compiled
+def _note_undecided(limited: Any, n_inserted: Any, n: int, total: int, undecided: Any, n_undecided: int) -> None:
+    """The first states of the cells that are undecided, by their place among all states after ``total`` others."""
+    at = total
+    for j in range(n):
+        if limited[j]:
+            undecided[n_undecided] = at
+            n_undecided += 1
+        at += 1 + n_inserted[j]
+
+
 @compiled
 def integrate(
     values: Any,
@@ -459,22 +605,11 @@ def integrate(
     n_undecided = total = cells = 0
     status = DONE
 
-    # The curve: n positions in use of these.
-    curve = np.empty((4 * n, 7))
-    theta = np.empty(len(curve))  # heat potential at the surface
-    stopped = np.zeros(len(curve), np.bool_)  # no longer advanced
-    connected = np.ones(len(curve), np.bool_)  # whether the curve continues to the next position
-    region = np.empty(len(curve), np.int64)
-    residual = np.empty(len(curve))
-    length = np.empty(len(curve))  # distance from the next position
-    # The same positions in the step before: place among the states, and where they are now, since some are inserted
-    # between.
-    previous = np.full(len(curve), -1, np.int64)
-    shifted = np.empty(len(curve), np.int64)
-    n_inserted = np.empty(len(curve), np.int64)  # how many to insert after a position
-    inserted = np.empty((len(curve), 7))
+    curve, inserted, slopes = np.empty((4 * n, 7)), np.empty((4 * n, 7)), np.empty((4 * n, 6))
+    theta, came, residual, length = np.empty(4 * n), np.full(4 * n, -1.0), np.empty(4 * n), np.empty(4 * n)
+    stopped, connected, limited = np.zeros(4 * n, np.bool_), np.ones(4 * n, np.bool_), np.zeros(4 * n, np.bool_)
+    region, n_inserted = np.empty(4 * n, np.int64), np.empty(4 * n, np.int64)
     lengths = np.empty((3, 5))
-    slopes = np.empty((len(curve), 6))
     theta[:n] = theta_s
     curve[:n, S_T] = log_t
     # The outermost trajectories tell where branches lead out of the range.
@@ -484,120 +619,47 @@ def integrate(
         over = overburden[step]
         p = over + p_s
         if p_s == 0.0 and (step == 0 or over <= layer_depth):
-            for j in range(n):
-                _start_in_layer(values, layer, slope, over, theta[j], curve, j)
+            _start_all_in_layer(values, layer, slope, over, theta, curve, n)
         elif step == 0:
-            for j in range(n):
-                _start_at_interface(values, slope, p_s, y_s, theta[j], over, curve, j)
+            _start_all_at_interface(values, slope, p_s, y_s, theta, over, curve, n)
         else:
-            slopes = _grow(slopes, n)
             half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths)
             _advance(values, half_tau, lengths, curve, n, stopped, slopes)
-            for j in range(n):
-                if not stopped[j] and (not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST):
-                    curve[j, S_Y] = _COLDEST / per_flux
-                    curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
-                    if not math.isfinite(curve[j, S_H]):
-                        curve[j, S_H] = 1e300
-                    if not math.isfinite(curve[j, S_G]):
-                        curve[j, S_G] = 1e300
-                    stopped[j] = True
-        # Where to insert; a cell is undecided where that is not enough.
-        for j in range(n):
-            region[j] = COLD if stopped[j] else _find_region_or_limit(bounds, p, curve, j, limits)
-            residual[j] = curve[j, S_Y] - interpolate_table(values, curve[j, S_L], BASE)
-        for j in range(n - 1):
-            length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
-        extra = 0
-        for j in range(n):
-            n_inserted[j] = 0
-            if j + 1 == n or not connected[j] or (region[j] != FREE and region[j] == region[j + 1]):
-                continue
-            cells += 1
-            limited = False
-            if length[j] > delta:
-                n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-                limited = length[j] > 2.0 * delta * (n_inserted[j] + 1)
-            else:
-                doubtful = _hides_zeros(values, steepest, curve, residual, j, n, connected, length)
-                n_inserted[j] = 1 if doubtful and length[j] > finest else 0
-                limited = doubtful and length[j] <= finest
-            if limited:
-                undecided = _grow(undecided, n_undecided + 1)
-                undecided[n_undecided] = j + extra + total
-                n_undecided += 1
-            extra += n_inserted[j]
-        if total + n + extra > most:
+            _stop(curve, n, stopped, _COLDEST / per_flux)
+        _examine(values, bounds, p, per_flux, limits, curve, n, stopped, region, residual, length)
+        extra, examined, new = _plan_insertions(
+            values, steepest, delta, finest, curve, n, connected, region, residual, length, n_inserted, limited
+        )
+        cells += examined
+        if new > 0:
+            undecided = _grow(undecided, n_undecided + new)
+            _note_undecided(limited, n_inserted, n, total, undecided, n_undecided)
+            n_undecided += new
+        m = n + extra
+        if total + m > most:
             status = FULL
             first[step + 1 :] = total
             break
-        m = n + extra
-        states = _grow(states, total + m)
-        came_from = _grow(came_from, total + m)
-        goes_on = _grow(goes_on, total + m)
-        for j in range(n):
-            shifted[j] = j
+        if total + m > len(states):
+            states, came_from, goes_on = (
+                _grow(states, total + m),
+                _grow(came_from, total + m),
+                _grow(goes_on, total + m),
+            )
+        if m > len(curve):
+            curve, slopes, theta, came = _grow(curve, m), _grow(slopes, m), _grow(theta, m), _grow(came, m)
+            residual, length, region = _grow(residual, m), _grow(length, m), _grow(region, m)
+            stopped, connected, limited = _grow(stopped, m), _grow(connected, m), _grow(limited, m)
+            n_inserted = _grow(n_inserted, m)
         if extra > 0:
             inserted = _grow(inserted, extra)
-            k = 0
-            for j in range(n):
-                for c in range(n_inserted[j]):
-                    _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
-                    k += 1
-            if m > len(curve):
-                curve, theta, stopped = _grow(curve, m), _grow(theta, m), _grow(stopped, m)
-                connected, region, residual, length = (
-                    _grow(connected, m),
-                    _grow(region, m),
-                    _grow(residual, m),
-                    _grow(length, m),
-                )
-                previous, shifted, n_inserted = _grow(previous, m), _grow(shifted, m), _grow(n_inserted, m)
-            # From the end of the curve, so that nothing is overwritten before it is shifted.
-            at = m
-            for j in range(n - 1, -1, -1):
-                for c in range(n_inserted[j] - 1, -1, -1):
-                    at -= 1
-                    k -= 1
-                    t = (c + 1.0) / (n_inserted[j] + 1.0)
-                    for q in range(7):
-                        curve[at, q] = inserted[k, q]
-                    theta[at] = theta[j] + t * (theta[shifted[j + 1]] - theta[j])
-                    stopped[at] = False
-                    connected[at] = True
-                    region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
-                    residual[at] = inserted[k, S_Y] - interpolate_table(values, inserted[k, S_L], BASE)
-                    came_from[total + at] = previous[j] + t * (previous[j + 1] - previous[j])
-                at -= 1
-                if at == j:
-                    break  # nothing was inserted before
-                shifted[j] = at
-                for q in range(7):
-                    curve[at, q] = curve[j, q]
-                theta[at], stopped[at] = theta[j], stopped[j]
-                connected[at], region[at], residual[at] = connected[j], region[j], residual[j]
-        for j in range(n):
-            came_from[total + shifted[j]] = previous[j]
-        for j in range(m):
-            for q in range(_KEPT):
-                states[total + j, q] = curve[j, q]
-            goes_on[total + j] = connected[j]
+            _interpolate_planned(curve, n, connected, length, n_inserted, inserted)
+            _insert(
+                bounds, p, limits, n_inserted, inserted, extra,
+                curve, n, theta, stopped, connected, region, came,
+            )  # fmt: skip
         first[step] = total
-        # Close the curve where both ends of an interval lie in one invariant region, and drop what is closed in.
-        at = 0
-        joined = False  # to the position before
-        for j in range(m):
-            ahead = j + 1 < m and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
-            if joined or ahead:
-                if at < j:
-                    for q in range(7):
-                        curve[at, q] = curve[j, q]
-                    theta[at], stopped[at] = theta[j], stopped[j]
-                connected[at] = ahead
-                previous[at] = total + j
-                at += 1
-            joined = ahead
-        n = at
+        n = _record(states, came_from, goes_on, total, curve, m, theta, stopped, connected, region, came)
         total += m
         first[step + 1] = total
         if n == 0:
