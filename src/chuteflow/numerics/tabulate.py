@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.compiled import compiled, compiled_in_place
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _TOGETHER = 4
 
 
-@compiled
+@compiled_in_place
 def find_piece(edges: Any, pieces: int, position: float) -> tuple[int, float]:
     """The piece of a ``position`` counted in equal pieces, and the place on it from -1 to 1."""
     i = min(int(position), pieces - 1)
@@ -37,10 +37,16 @@ def find_piece(edges: Any, pieces: int, position: float) -> tuple[int, float]:
 @compiled
 def _evaluate_all(coefficients: Any, edges: Any, positions: Any, used: int) -> Any:
     """The first ``used`` functions of a table at ``positions`` (n,) counted in equal pieces, as rows (used, n)."""
+    out = np.empty((used, len(positions)))
+    _fill(coefficients, edges, positions, np.empty(len(positions)), out)
+    return out
+
+
+@compiled_in_place
+def _fill(coefficients: Any, edges: Any, positions: Any, place: Any, out: Any) -> None:
+    """The same into ``out`` (used, n); ``place`` (n,) is space."""
     degree, pieces, _ = coefficients.shape
-    n = len(positions)
-    out = np.empty((used, n))
-    place = np.empty(n)
+    used, n = out.shape
     begin = 0
     while begin < n:
         i, place[begin] = find_piece(edges, pieces, positions[begin])
@@ -58,14 +64,12 @@ def _evaluate_all(coefficients: Any, edges: Any, positions: Any, used: int) -> A
                         value = value * place[k] + coefficients[d, i, q]
                     out[q, k] = value
             else:
-                row, t = out[q, begin:end], place[begin:end]
-                row[:] = coefficients[degree - 1, i, q]
+                out[q, begin:end] = coefficients[degree - 1, i, q]
                 for d in range(degree - 2, -1, -1):
                     c = coefficients[d, i, q]
-                    for k in range(end - begin):
-                        row[k] = row[k] * t[k] + c
+                    for k in range(begin, end):
+                        out[q, k] = out[q, k] * place[k] + c
         begin = end
-    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.compiled import compiled, compiled_in_place
 from chuteflow.trajectories.tables import (
     BASE,
     BASE_ABOVE,
@@ -67,7 +67,7 @@ _MOST_INSERTED = 12
 DONE, FULL = range(2)
 
 
-@compiled
+@compiled_in_place
 def interpolate_table(values: Any, big_l: float, column: int) -> float:
     """One function of the table, linear between entries."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -75,7 +75,7 @@ def interpolate_table(values: Any, big_l: float, column: int) -> float:
     return values[i, column] + (at - i) * (values[i + 1, column] - values[i, column])
 
 
-@compiled
+@compiled_in_place
 def _evaluate_derivative(values: Any, per_p: float, p: float, big_l: float, y: float) -> tuple[float, float]:
     """dL/dp and dy/dp, where ``per_p`` is 1/p."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -89,7 +89,7 @@ def _evaluate_derivative(values: Any, per_p: float, p: float, big_l: float, y: f
     return still * per_p, net - y * (1.0 + 0.5 * (v + k * still)) * per_p
 
 
-@compiled
+@compiled_in_place
 def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[float, float]:
     """P/nu and P du/dp, where ``shear`` is slope P sqrt(p)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -101,7 +101,7 @@ def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -
     return over * root * root * height, shear * root * shearing
 
 
-@compiled
+@compiled_in_place
 def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
     """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau, slope P sqrt(p), p and 1/p at its ends
     and middle into ``out`` (3, 5)."""
@@ -121,7 +121,7 @@ def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: floa
     return half_tau
 
 
-@compiled
+@compiled_in_place
 def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, stopped: Any, slopes: Any) -> None:
     """One step of the first ``n`` states but the ``stopped`` ones by the classical Runge-Kutta method in tau, for which
     :func:`_prepare_step` gives the lengths; integrals by Simpson.
@@ -156,7 +156,7 @@ def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, sto
         curve[j, S_DH], curve[j, S_DG] = h_1, g_1
 
 
-@compiled
+@compiled_in_place
 def _follow(out: Any, before: Any, i: int, q: int, half: float, rate: float, source: float) -> None:
     """Entry ``i`` of function ``q``, whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
     with half a step of ``half``; in balance at the first. ``before`` (7,) is what the next entry needs of this."""
@@ -177,14 +177,19 @@ def expand_in_layer(values: Any, low: Any, high: Any, log_scale: float, deepest:
 
     with functions of lambda alone (entries, 7), whose derivatives follow by comparing powers of P.
     """
-    beta = values[0, BETA]
-    last = int(((1.0 + beta) * math.log(deepest) - log_scale - LOW) * PER_UNIT) + 2
+    last = int(((1.0 + values[0, BETA]) * math.log(deepest) - log_scale - LOW) * PER_UNIT) + 2
     last = min(max(last, 1), ENTRIES - 1)
     out = np.empty((last + 1, 7))
-    before = np.zeros(7)
+    return out, _expand(values, low, high, log_scale, deepest, out, np.zeros(7))
+
+
+@compiled_in_place
+def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, out: Any, before: Any) -> float:
+    """Fills ``out``, and gives the overburden above all flows; ``before`` (7,) is space."""
+    beta = values[0, BETA]
     half = 0.5 / ((1.0 + beta) * PER_UNIT)
     first = deepest
-    for i in range(last + 1):
+    for i in range(len(out)):
         after, ahead = max(i - 1, 0), min(i + 1, ENTRIES - 1)
         per = PER_UNIT / (ahead - after)
         net_slope = per * (values[ahead, NET] - values[after, NET])
@@ -207,16 +212,16 @@ def expand_in_layer(values: Any, low: Any, high: Any, log_scale: float, deepest:
         nearest = 0.0 if least <= 0.0 <= most else min(abs(least), abs(most))
         reached = math.exp((LOW + i / PER_UNIT + log_scale) / (1.0 + beta))
         first = min(first, max(nearest / (_FAR * max(abs(out[i, Y_1]), 1e-300)), reached / _FAR))
-    return out, first
+    return first
 
 
-@compiled
+@compiled_in_place
 def _between(table: Any, i: int, t: float, column: int) -> float:
     """One function at the place ``t`` from entry ``i`` to the next."""
     return table[i, column] + t * (table[i + 1, column] - table[i, column])
 
 
-@compiled
+@compiled_in_place
 def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s: float, out: Any, j: int) -> None:
     """State ``j`` in the layer at a free surface, by its expansion."""
     big_l = (1.0 + values[0, BETA]) * math.log(over) - theta_s
@@ -233,7 +238,7 @@ def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s:
     out[j, S_DH], out[j, S_DG] = _evaluate_integrands(values, over, slope * over * math.sqrt(over), out[j, S_L])
 
 
-@compiled
+@compiled_in_place
 def _start_all_in_layer(values: Any, layer: Any, slope: float, over: float, theta: Any, curve: Any, n: int) -> None:
     for j in range(n):
         _start_in_layer(values, layer, slope, over, theta[j], curve, j)
@@ -248,7 +253,7 @@ def states_in_layer(values: Any, layer: Any, overburden: Any, theta_s: float) ->
     return states[:, :2]
 
 
-@compiled
+@compiled_in_place
 def _start_all_at_interface(
     values: Any, slope: float, p_s: float, y_s: float, theta: Any, over: float, curve: Any, n: int
 ) -> None:
@@ -263,7 +268,7 @@ def _start_all_at_interface(
         curve[j, S_DH], curve[j, S_DG] = h, g
 
 
-@compiled
+@compiled_in_place
 def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
     """The invariant region in which a state lies: from there on B keeps its sign (docs/theory/enumeration.md)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -287,7 +292,7 @@ def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
     return FREE
 
 
-@compiled
+@compiled_in_place
 def _find_region_or_limit(bounds: Any, p: float, curve: Any, j: int, limits: tuple[float, float, float]) -> int:
     """The region of a state; BEYOND where its flux by shear, which grows downwards, is larger than the first of what is
     ``limits``, and ln T_surface between the others."""
@@ -296,20 +301,20 @@ def _find_region_or_limit(bounds: Any, p: float, curve: Any, j: int, limits: tup
     return find_region(bounds, p, curve[j, S_L], curve[j, S_Y])
 
 
-@compiled
+@compiled_in_place
 def _scale_density(big_l: float) -> float:
     """L as distances count it."""
     return big_l if big_l > DILUTE else DILUTE + DILUTE_WEIGHT * (big_l - DILUTE)
 
 
-@compiled
+@compiled_in_place
 def _measure_distance(curve: Any, j: int, per_flux: float) -> float:
     """Of position j of the curve from the next."""
     apart = _scale_density(curve[j, S_L]) - _scale_density(curve[j + 1, S_L])
     return math.sqrt(apart * apart + ((curve[j, S_Y] - curve[j + 1, S_Y]) * per_flux) ** 2)
 
 
-@compiled
+@compiled_in_place
 def _limit_slope(before: float, after: float, d_before: float, d_after: float) -> float:
     """Slope at a point between two secants that keeps the interpolant monotonic (Fritsch & Butland 1984)."""
     one, two = before / d_before, after / d_after
@@ -319,7 +324,7 @@ def _limit_slope(before: float, after: float, d_before: float, d_after: float) -
     return (w_1 + w_2) / (w_1 / one + w_2 / two)
 
 
-@compiled
+@compiled_in_place
 def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, t: float, out: Any, k: int) -> None:
     """The state at ``t`` of the way from position j of the curve to the next, into ``out[k]``: a monotonic cubic."""
     d = length[j]
@@ -336,7 +341,7 @@ def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, 
         )
 
 
-@compiled
+@compiled_in_place
 def _is_far_from_zero(steepest: float, curve: Any, least: float, j: int, n: int, connected: Any, length: Any) -> bool:
     """Whether along the cubic between position j of the curve and the next the residual certainly changes by less than
     half of ``least``, its smaller size at the two; told from neighbours that are not much nearer."""
@@ -356,7 +361,7 @@ def _is_far_from_zero(steepest: float, curve: Any, least: float, j: int, n: int,
     return 2.0 * (most_y + steepest * most_l) <= least
 
 
-@compiled
+@compiled_in_place
 def _hides_zeros(
     values: Any, steepest: float, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any
 ) -> bool:
@@ -408,7 +413,7 @@ def _grow(array: Any, size: int) -> Any:
     return out
 
 
-@compiled
+@compiled_in_place
 def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
     """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to
     join neighbours the one with the shorter lines."""
@@ -429,11 +434,11 @@ def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
 
 # What follows works on the positions of the curve: of the first n of the arrays, ``theta`` is the heat potential at the
 # surface, ``stopped`` whether a state is no longer advanced, ``connected`` whether the curve continues to the next,
-# ``came`` the place among the states of the step before, ``region`` the invariant region, ``residual`` B, and ``length``
-# the distance from the next. They are own functions since numba counts references to arrays that are assigned anew.
+# ``came`` the place among the states of the step before, ``region`` the invariant region, ``residual`` B, and
+# ``length`` the distance from the next.
 
 
-@compiled
+@compiled_in_place
 def _stop(curve: Any, n: int, stopped: Any, coldest: float) -> None:
     """Stop the states that are too cold or too dense to be advanced."""
     for j in range(n):
@@ -447,7 +452,7 @@ def _stop(curve: Any, n: int, stopped: Any, coldest: float) -> None:
             stopped[j] = True
 
 
-@compiled
+@compiled_in_place
 def _examine(
     values: Any, bounds: Any, p: float, per_flux: float, limits: tuple[float, float, float],
     curve: Any, n: int, stopped: Any, region: Any, residual: Any, length: Any,
@@ -460,7 +465,7 @@ def _examine(
         length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
 
 
-@compiled
+@compiled_in_place
 def _plan_insertions(
     values: Any, steepest: float, delta: float, finest: float,
     curve: Any, n: int, connected: Any, region: Any, residual: Any, length: Any, n_inserted: Any, limited: Any,
@@ -484,7 +489,7 @@ def _plan_insertions(
     return extra, cells, undecided
 
 
-@compiled
+@compiled_in_place
 def _interpolate_planned(curve: Any, n: int, connected: Any, length: Any, n_inserted: Any, inserted: Any) -> None:
     """The states to insert, in order."""
     k = 0
@@ -494,7 +499,7 @@ def _interpolate_planned(curve: Any, n: int, connected: Any, length: Any, n_inse
             k += 1
 
 
-@compiled
+@compiled_in_place
 def _insert(
     bounds: Any, p: float, limits: tuple[float, float, float], n_inserted: Any, inserted: Any, extra: int,
     curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
@@ -529,7 +534,7 @@ def _insert(
         )
 
 
-@compiled
+@compiled_in_place
 def _record(
     states: Any, came_from: Any, goes_on: Any, total: int,
     curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
@@ -555,7 +560,7 @@ def _record(
     return at
 
 
-@compiled
+@compiled_in_place
 def _note_undecided(limited: Any, n_inserted: Any, n: int, total: int, undecided: Any, n_undecided: int) -> None:
     """The first states of the cells that are undecided, by their place among all states after ``total`` others."""
     at = total
@@ -802,7 +807,7 @@ def trace_back(states: Any, came_from: Any, place: float, step: int) -> Any:
     return out
 
 
-@compiled
+@compiled_in_place
 def _passed_above(values: Any, bounds: Any, p_s: float, big_l: float) -> tuple[float, float]:
     """The least and the largest net loss on a trajectory above where the curve starts with L on it: below a free
     surface L rises to there, and at an interface it starts there."""
