@@ -38,7 +38,8 @@ def find_piece(edges: Any, pieces: int, position: float) -> tuple[int, float]:
 def _evaluate_all(coefficients: Any, edges: Any, positions: Any, used: int) -> Any:
     """The first ``used`` functions of a table at ``positions`` (n,) counted in equal pieces, as rows (used, n)."""
     out = np.empty((used, len(positions)))
-    _fill(coefficients, edges, positions, np.empty(len(positions)), out)
+    if len(positions) > 0:
+        _fill(coefficients, edges, positions, np.empty(len(positions)), out)
     return out
 
 
@@ -48,8 +49,8 @@ def _fill(coefficients: Any, edges: Any, positions: Any, place: Any, out: Any) -
     degree, pieces, _ = coefficients.shape
     used, n = out.shape
     begin = 0
+    i, place[0] = find_piece(edges, pieces, positions[0])
     while begin < n:
-        i, place[begin] = find_piece(edges, pieces, positions[begin])
         end, there = begin + 1, i
         while end < n:
             there, place[end] = find_piece(edges, pieces, positions[end])
@@ -57,19 +58,20 @@ def _fill(coefficients: Any, edges: Any, positions: Any, place: Any, out: Any) -
                 break
             end += 1
         for q in range(used):
+            row, t = out[q, begin:end], place[begin:end]
             if end - begin < _TOGETHER:
-                for k in range(begin, end):
+                for k in range(end - begin):
                     value = coefficients[degree - 1, i, q]
                     for d in range(degree - 2, -1, -1):
-                        value = value * place[k] + coefficients[d, i, q]
-                    out[q, k] = value
+                        value = value * t[k] + coefficients[d, i, q]
+                    row[k] = value
             else:
-                out[q, begin:end] = coefficients[degree - 1, i, q]
+                row[:] = coefficients[degree - 1, i, q]
                 for d in range(degree - 2, -1, -1):
                     c = coefficients[d, i, q]
-                    for k in range(begin, end):
-                        out[q, k] = out[q, k] * place[k] + c
-        begin = end
+                    for k in range(end - begin):
+                        row[k] = row[k] * t[k] + c
+        begin, i = end, there
 
 
 @dataclass(frozen=True, eq=False)

@@ -267,7 +267,7 @@ def model(chute: Chute) -> Model:
     return _registered(chute, chute.law)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)

@@ -60,7 +60,7 @@ def _closures(table: FunctionTable) -> Array:
     return table.values(_coordinates())
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def tables(model: Model) -> Tables:
     """The tables of ``model``."""
     f = _closures(model.table)
