@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -199,9 +200,9 @@ class SolutionBranch:
                 found.pop()
             found = [*found, found[0]] if len(found) > 2 else []
         pieces: list[list[PathPoint]] = [found[:1]]
-        for one, other in pairwise(found):
+        for other in found[1:]:
             try:
-                pieces[-1] += refine_path([one, other], tolerance)[1:]
+                pieces[-1] += refine_path([pieces[-1][-1], other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
         ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
@@ -278,10 +279,12 @@ def explain_incompleteness(
     names: tuple[str, str],
     which: int = 0,
     value: float | None = None,
+    unsure: Sequence[Array] = (),
 ) -> str | None:
     """What the search leaves open in the range, in words: what was seen and not solved, with rough quantities ``lost``
     and the ``names`` of one and of several; depths not reached; cells that may hide flows, where a value is given
-    only those near it."""
+    only those near it; branches that come as near to the value as they are known, and could not be solved there, with
+    rough quantities ``unsure``."""
     if lost:
         one, several = names
         many = f"{len(lost)} {several} were" if len(lost) > 1 else f"{one} was"
@@ -291,7 +294,9 @@ def explain_incompleteness(
     hidden = [m for m in grid.hidden if within.contains(m) and np.isfinite(m).all()]
     if value is not None:
         hidden = [m for m in hidden if abs(m[which] - np.log(value)) < _HIDDEN]
-    return f"the search does not tell flows apart near {_place(hidden[0])}" if hidden else None
+    if hidden:
+        return f"the search does not tell flows apart near {_place(hidden[0])}"
+    return f"a branch could not be followed near {_place(unsure[0])}, where it may have some" if unsure else None
 
 
 def _place(macroscopic: Array) -> str:
@@ -301,9 +306,10 @@ def _place(macroscopic: Array) -> str:
 
 def solve_crossings(
     branch: SolutionBranch, which: int, value: float, tolerance: float = TOLERANCE
-) -> tuple[list[Solution], list[Array]]:
-    """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
-    that were seen and could not be solved."""
+) -> tuple[list[Solution], list[Array], list[Array]]:
+    """The flows of a branch at which the quantity ``which`` equals ``value``; the rough quantities (4,) of those that
+    were seen and could not be solved; and those of places that come near to the value where the branch could not be
+    solved to tell."""
     target = float(np.log(value))
     m = branch.macroscopic
     off = m[:, which] - target
@@ -320,6 +326,7 @@ def solve_crossings(
             crossed.append((place, piece))
     found: list[Solution] = []
     lost: list[Array] = []
+    unsure: list[Array] = []
     for begin, end in _runs(near, branch.arclength):
         single = _solve_single(branch, which, target, off, begin, end, tolerance)
         solved = [single] if single is not None else _solve_among(branch, which, target, begin, end, tolerance)
@@ -327,8 +334,9 @@ def solve_crossings(
             if branch.separate:
                 lost += [m[i] for i in changes.tolist() if begin <= i < end]
             lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
+            unsure.append(m[begin + int(np.abs(off[begin : end + 1]).argmin())])
         found += solved or []
-    return found, lost
+    return found, lost, unsure
 
 
 def _doubt_of(off: Array, arclength: Array) -> Array:
