@@ -68,6 +68,8 @@ _AT_EDGE = 1e-6
 _HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
+#: A point is on a branch that passes it so closely, between points or so far beyond them, in parts of their distance.
+_ONE, _BEYOND = 1e-6, 0.01
 #: A logarithm that differs by less is at its value.
 _ROUNDING = 1e-14
 #: Searches whose result is remembered.
@@ -333,8 +335,8 @@ def solve_crossings(
         if solved is None:
             if branch.separate:
                 lost += [m[i] for i in changes.tolist() if begin <= i < end]
+                unsure.append(m[begin + int(np.abs(off[begin : end + 1]).argmin())])
             lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
-            unsure.append(m[begin + int(np.abs(off[begin : end + 1]).argmin())])
         found += solved or []
     return found, lost, unsure
 
@@ -534,6 +536,18 @@ class TracedBranch:
         """The points at which a quantity turns."""
         return locate_turning_points(self.points, which, tolerance)
 
+    def passes(self, piece: TracedBranch, tolerance: float) -> bool:
+        """Whether the middle point of a short piece lies on the branch."""
+        m = piece.points[len(piece.points) // 2].m
+        for first, last in pairwise(self.points):
+            chord = Chord(first, last, tolerance)
+            sigma = chord.place(m)
+            if -_BEYOND < sigma < 1.0 + _BEYOND and np.linalg.norm(chord.first.m - m) < 2.0 * chord.length:
+                point = chord.at(sigma)
+                if point is not None and np.linalg.norm(point.m - m) < _ONE:
+                    return True
+        return False
+
     def at(self, places: Array, tolerance: float) -> list[PathPoint]:
         """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
@@ -558,8 +572,11 @@ def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list
     """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
     found: list[TracedBranch] = []
     lost: list[Array] = []
-    for branch in find_branches(model, within):
+    # Short pieces beside other branches come last: what is traced from them may be a part of these.
+    for branch in sorted(find_branches(model, within), key=lambda branch: not branch.separate):
         pieces = branch.traced(tolerance)
+        if not branch.separate:
+            pieces = [piece for piece in pieces if not any(other.passes(piece, tolerance) for other in found)]
         found += pieces
         inside = [m for m in branch.macroscopic if within.contains(m)]
         if len(inside) > 1 and not pieces and branch.separate:
