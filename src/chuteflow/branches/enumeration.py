@@ -218,9 +218,7 @@ def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapo
 
 def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = explain_incompleteness(
-        found.grid, found.within, found.lost, ("a flow", "flows"), which, value, found.unsure
-    )
+    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value, found.unsure)
     if left is not None:
         return left
     for lead in _leads(found, which, value):
