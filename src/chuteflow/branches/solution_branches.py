@@ -191,6 +191,17 @@ class SolutionBranch:
             inner.pop()
         return refine_path([first, *inner, last], tolerance)
 
+    def solved_between(self, begin: int, end: int, tolerance: float) -> list[PathPoint]:
+        """Points from about rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
+
+        Raises:
+            SolveError: where the branch could not be followed.
+        """
+        found = self._solved_near(self._spaced(begin, end), tolerance)
+        if len(found) < 2:
+            raise SolveError("a branch seen in the search could not be solved: ask for a larger tolerance")
+        return refine_path(found, tolerance)
+
     def traced(self, tolerance: float) -> list[TracedBranch]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])

@@ -8,19 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.counting import most_at_once
+from chuteflow.branches.counting import most_at_once, solve_turns
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.branches.solution_branches import SolutionBranch
 from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.interpolation import lagrange
 from chuteflow.steady import kinds as flow_kinds
-from chuteflow.trajectories.refining import TrajectoryGrid
+from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid
 
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
 #: Turns of ln Q along a branch are distinguished if they differ by more.
 _TURN = 1e-6
+#: To which branches are solved where the grid leaves the number of flows in doubt.
+_TOLERANCE = 1e-8
 #: A net loss below this fraction of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
@@ -32,8 +36,9 @@ class FlowClasses:
     """The flows of one chute in the range searched.
 
     ``at`` is whether there is one at each requested temperature; ``most`` is the largest number at one flux, and
-    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty;
-    ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
+    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty, and could
+    not be solved; ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have
+    the bits of
     INTERIORS and DENSITIES that are present.
     """
 
@@ -45,26 +50,61 @@ class FlowClasses:
     doubtful: bool
 
 
-def classify_flows(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
+def classify_flows(
+    grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float], within: SearchRange
+) -> FlowClasses:
     """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
-    of :func:`chuteflow.maps.zeros.bound_extremes`."""
-    lines = [line for line, _ in grid.lines if len(line) > 1]
+    of :func:`chuteflow.maps.zeros.bound_extremes`. Where the largest number of flows of one flux depends on turns of
+    the flux that are smaller than its uncertainty, the branches are solved there."""
+    lines = [line for line in grid.lines if len(line[0]) > 1]
     if not lines:
         return FlowClasses((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
     zeros = evaluate_zeros(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
-    pieces, interior, density = [], 0, 0
-    for line in lines:
-        hotter = zeros.log_t[line, None] >= np.log(temperatures)
-        at |= hotter.any(axis=0) & ~hotter.all(axis=0)
+    every, sure, interior, density = [], [], 0, 0
+    for line, _ in lines:
+        if len(temperatures):
+            hotter = zeros.log_t[line, None] >= np.log(temperatures)
+            at |= hotter.any(axis=0) & ~hotter.all(axis=0)
         kept = zeros.along(line)
-        pieces.append(_monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept]))
+        pieces = _monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept])
+        every.append(pieces[0])
+        sure.append(pieces[1])
         found = _present(zeros, kept)
         interior |= sum(bit for bit, there in zip(INTERIORS.values(), found[:3], strict=True) if there)
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
-    most, least = (most_at_once(np.concatenate(stretches), _TURN) for stretches in zip(*pieces, strict=True))
+    doubtful = _most(every) != _most(sure)
+    if doubtful:
+        solved = [
+            one if len(one) == len(other) else _solve_pieces(zeros, line, closed, within)
+            for (line, closed), one, other in zip(lines, sure, every, strict=True)
+        ]
+        known = [one for one in solved if one is not None]
+        if len(known) == len(lines):
+            sure, doubtful = known, False
     there = tuple(map(bool, at.tolist()))
-    return FlowClasses(there, least, len(lines), interior, density, doubtful=most != least)
+    return FlowClasses(there, _most(sure), len(lines), interior, density, doubtful)
+
+
+def _most(pieces: Sequence[Array]) -> int:
+    """The largest number of pieces that share a flux, given those of each branch."""
+    return most_at_once(np.concatenate(pieces), _TURN)
+
+
+def _solve_pieces(zeros: Zeros, line: Index, closed: bool, within: SearchRange) -> Array | None:
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, which are solved; None where
+    it could not be followed."""
+    grid = zeros.grid
+    kept = zeros.along(line)
+    apart, at = _places(zeros.log_t[kept], zeros.log_m[kept])
+    kept = kept[apart]
+    before, _ = _changes(zeros.rise[kept], at)
+    first, last = (int(np.flatnonzero(line == kept[i])[0]) for i in (before[0], before[-1] + 1))
+    branch = SolutionBranch(RoughBranch(grid, line, grid.macroscopic[line], closed), within)
+    turns = solve_turns(branch, first, last, _TOLERANCE)
+    if turns is None:
+        return None
+    return _stretches([float(zeros.log_q[kept[0]]), *turns.tolist(), float(zeros.log_q[kept[-1]])])
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:
@@ -105,9 +145,8 @@ def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> tuple[Array, Array]:
     """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, where ``rise`` changes
     sign: of all turns, and of those alone that are larger than ln Q is uncertain."""
-    length = np.hypot(np.diff(log_t), np.diff(log_m))
-    keep = np.append(True, length > 1e-9)
-    log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
+    apart, at = _places(log_t, log_m)
+    log_q, rise = log_q[apart], rise[apart]
     before, share = _changes(rise, at)
     if not before.size:
         whole = np.sort(log_q[[0, -1]])[None]
@@ -126,6 +165,13 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
     scatter = _scatter(log_q, at)
     noise = [0.0, *np.maximum(scatter[before], scatter[before + 1]), 0.0]
     return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, noise))
+
+
+def _places(log_t: Array, log_m: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which flows of a branch are apart from the one before, and the places of these along it."""
+    length = np.hypot(np.diff(log_t), np.diff(log_m))
+    apart = np.append(True, length > 1e-9)
+    return apart, np.cumsum(np.append(0.0, length))[apart]
 
 
 def _stretches(stops: list[float]) -> Array:

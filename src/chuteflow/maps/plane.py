@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.branches.counting import most_solved
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import number
 from chuteflow.errors import InputError
@@ -39,8 +38,6 @@ SUMMARY = ("hot", "most", "families", "interior", "density")
 HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
 #: Bases along an axis, which bound those that a grid has to serve.
 _BETWEEN = 9
-#: To which branches are solved where a grid leaves the number of flows in doubt.
-_TOLERANCE = 1e-8
 #: Surface temperatures whose logarithms are nearer are one.
 _SAME = 1e-6
 
@@ -154,12 +151,7 @@ def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
 
 def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
     grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
-    problem = model(chute)
-    found = classify_flows(grid.of_base(problem), extremes, plane.temperatures)
-    if not found.doubtful:
-        return found
-    most = most_solved(problem, plane.within, _TOLERANCE)
-    return found if most is None else replace(found, most=most, doubtful=False)
+    return classify_flows(grid.of_base(model(chute)), extremes, plane.temperatures, plane.within)
 
 
 def classify_hot(plane: ParameterPlane, outer: float, inner: float) -> Code:
