@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from chuteflow.branches.rough_turns import find_extrema
 from chuteflow.branches.solution_branches import SolutionBranch
 from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.interpolation import lagrange
+from chuteflow.numerics.compiled import compiled
 from chuteflow.steady import kinds as flow_kinds
 from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid
 
@@ -38,8 +39,7 @@ class FlowClasses:
     ``at`` is whether there is one at each requested temperature; ``most`` is the largest number at one flux, and
     ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty, and could
     not be solved; ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have
-    the bits of
-    INTERIORS and DENSITIES that are present.
+    the bits of INTERIORS and DENSITIES that are present.
     """
 
     at: tuple[bool, ...]
@@ -151,20 +151,12 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
     if not before.size:
         whole = np.sort(log_q[[0, -1]])[None]
         return whole, whole
-    turns = at[before] + (at[before + 1] - at[before]) * share
-    turned = np.interp(turns, at, log_q)
-    if len(at) > 3:
-        around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
-        cubic = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
-        # Through uneven places a cubic may overshoot: beyond the step by no more than the steps around.
-        reach = np.abs(np.diff(log_q[around], axis=0)).max(axis=0)
-        turned = np.clip(cubic, turned - reach, turned + reach)
+    turned, noise = _turned(log_q, at, before, share)
     along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
     first = along if rise[0] > 0.0 else -along
-    stops = [log_q[0], *turned, log_q[-1]]
-    scatter = _scatter(log_q, at)
-    noise = [0.0, *np.maximum(scatter[before], scatter[before + 1]), 0.0]
-    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, noise))
+    stops = [float(log_q[0]), *turned.tolist(), float(log_q[-1])]
+    scatter = [0.0, *noise.tolist(), 0.0]
+    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, scatter))
 
 
 def _places(log_t: Array, log_m: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -178,15 +170,43 @@ def _stretches(stops: list[float]) -> Array:
     return np.sort(np.stack([stops[:-1], stops[1:]], axis=1), axis=1)
 
 
-def _scatter(log_q: Array, at: Array) -> Array:
-    """How far values (k,) lie beside the cubics through the two before and the two after, (k,); at the two places next
-    to each end as at the nearest other."""
-    if len(at) < 5:
-        return np.zeros(len(at))
-    middle = np.arange(2, len(at) - 2)
-    around = middle + np.array([-2, -1, 1, 2])[:, None]
-    beside = np.abs((lagrange(at[around], at[middle]) * log_q[around]).sum(axis=0) - log_q[middle])
-    return np.pad(beside, 2, mode="edge")
+@compiled
+def _turned(log_q: Any, at: Any, before: Any, share: Any) -> tuple[Any, Any]:
+    """ln Q where it turns in the steps ``before`` (k,) of the places ``at``, at the ``share`` of each; and how far its
+    values beside these lie beside the cubics through the two before and the two after (k,)."""
+    turned, noise = np.empty(len(before)), np.zeros(len(before))
+    count = len(at)
+    for k in range(len(before)):
+        i = before[k]
+        here = at[i] + (at[i + 1] - at[i]) * share[k]
+        turned[k] = log_q[i] + share[k] * (log_q[i + 1] - log_q[i])
+        if count > 3:
+            first = min(max(i - 1, 0), count - 4)
+            around = np.arange(first, first + 4)
+            # Through uneven places a cubic may overshoot: beyond the step by no more than the steps around.
+            reach = np.abs(np.diff(log_q[first : first + 4])).max()
+            cubic = _through(at, log_q, around, here)
+            turned[k] = min(max(cubic, turned[k] - reach), turned[k] + reach)
+        for side in (i, i + 1):
+            if count > 4:
+                # At the two places next to each end as at the nearest other.
+                middle = min(max(side, 2), count - 3)
+                around = middle + np.array([-2, -1, 1, 2])
+                noise[k] = max(noise[k], abs(_through(at, log_q, around, at[middle]) - log_q[middle]))
+    return turned, noise
+
+
+@compiled
+def _through(at: Any, values: Any, around: Any, x: float) -> float:
+    """At ``x`` the cubic through the values at four places."""
+    total = 0.0
+    for i in around:
+        weight = 1.0
+        for j in around:
+            if j != i:
+                weight *= (x - at[j]) / (at[i] - at[j])
+        total += weight * values[i]
+    return total
 
 
 def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
@@ -196,6 +216,8 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     pairs = [
         (dip.step, zero) for dip in find_extrema(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros
     ]
+    if not pairs:
+        return changes, rise[changes] / (rise[changes] - rise[changes + 1])
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
     fractions = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]

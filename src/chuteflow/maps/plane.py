@@ -150,7 +150,7 @@ def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
-    grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
+    grid, extremes = _grid(plane, chute.slope, chute.restitution, chute.law)
     return classify_flows(grid.of_base(model(chute)), extremes, plane.temperatures, plane.within)
 
 
@@ -181,10 +181,10 @@ def _neutral(plane: ParameterPlane) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
-    """The grid of trajectories of all points of ``plane`` whose grains, with their law, and slope are those of
-    ``chute``, and its extremes."""
+def _grid(plane: ParameterPlane, slope: float, restitution: float, registered: Law) -> tuple[TrajectoryGrid, Array]:
+    """The grid of trajectories of all points of ``plane`` with one slope and restitution, and its extremes."""
     del registered  # known here to tell what is remembered of one law from that of another
+    chute = replace(plane.chute, slope=slope, restitution=restitution, **_neutral(plane))
     served = [chute]
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:
