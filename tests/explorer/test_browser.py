@@ -800,6 +800,65 @@ def test_what_was_measured_is_drawn_behind_the_flows(page):
     expect(page.locator("#profile-nu .measured")).to_have_count(0)
 
 
+MEASURED = b"z,nu,Q,h\n0.5,0.4,4,3\n1.5,0.3,,\n2.5,0.2,,\n"
+
+
+@pytest.mark.slow
+def test_measurements_are_loaded_from_a_file_by_hand_and_dropped(page, tmp_path):
+    opened(page)
+    own = {"name": "own.csv", "mimeType": "text/csv", "buffer": MEASURED}
+    chooser = page.get_by_label("Load measurements")
+    chooser.focus()
+    with page.expect_file_chooser() as chosen:
+        chooser.press("Space")
+    chosen.value.set_files([own])
+    expect(page.locator("#load-words")).to_have_text("1 measured flow is drawn.")
+    expect(page.locator("#profile-nu .measured")).to_have_count(3)
+    expect(page.locator("#curve .measured")).to_have_count(1)
+    # What is wrong is told on a line, and the rest is drawn.
+    chooser.set_input_files([{**own, "name": "bad.csv", "buffer": b"a,b\n1,2\n"}, {**own, "name": "other.csv"}])
+    expect(page.locator("#load-words")).to_contain_text("1 measured flow is drawn. bad.csv: unknown column 'a'")
+    expect(page.locator("#data li")).to_have_count(2)
+    chooser.set_input_files([{**own, "name": "large.csv", "buffer": b"1" * 2_000_001}])
+    expect(page.locator("#load-words")).to_contain_text("has more than 2 MB")
+    # Or dropped anywhere.
+    page.evaluate(
+        """(text) => {
+          const dataTransfer = new DataTransfer();
+          dataTransfer.items.add(new File([text], "dropped.csv"));
+          document.querySelector("main").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
+        }""",
+        MEASURED.decode(),
+    )
+    expect(page.locator("#data li")).to_have_count(3)
+    # The page that needs no server has those that are shown.
+    page.locator("#data input").nth(1).uncheck()
+    with page.expect_download(timeout=100_000) as download:
+        page.locator("[data-export=page-html]").click()
+    path = tmp_path / "chuteflow.html"
+    download.value.save_as(path)
+    page.goto(path.as_uri())
+    expect(page.locator("#data li")).to_have_count(2)
+    expect(page.locator("#data li").nth(1)).to_contain_text("dropped")
+    expect(page.locator("#profile-nu .measured")).to_have_count(6)
+    assert page.locator(".served:visible").count() == 0
+
+
+@pytest.mark.slow
+def test_the_page_opens_with_the_chute_of_the_command_line_at_any_address(page):
+    about = page.request.get("/about").json() | {"first": {"slope": 0.35, "Q": 2.0, "si": "1", "d": "2.0"}}
+    page.route("**/about", lambda route: route.fulfill(json=about))
+    opened(page)
+    expect(page.locator("#slope")).to_have_value("0.35")
+    expect(page.locator("#si")).to_be_checked()
+    page.locator("#si").uncheck()
+    page.wait_for_timeout(400)
+    # What was changed is kept by the address, also where it is the usual.
+    assert parse_qs(urlsplit(page.url).query, keep_blank_values=True)["si"] == [""]
+    page.reload()
+    expect(page.locator("#si")).not_to_be_checked()
+
+
 @pytest.mark.slow
 def test_the_map_follows_the_sliders_coarsely_and_is_fine_when_they_rest(page):
     def column(route):

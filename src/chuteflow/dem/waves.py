@@ -156,7 +156,7 @@ def _fit_exponent(times: Array, data: Complex, starts: Sequence[complex]) -> tup
     return complex(found.x[0], found.x[1]) / half, 2.0 * float(found.cost)
 
 
-def _redrawn(times: Array, data: Complex, s: complex) -> Iterator[Complex]:
+def _redrawn(times: Array, data: Complex, s: complex) -> Iterator[Any]:
     """Waves (n, 2) that start as ``data`` and are driven by its noise, in blocks in another order.
 
     In terms of the two modes, z exp(-s t) is constant but for the noise, whose steps follow from the data.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import tempfile
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import numpy as np
 from chuteflow.branches.curve import curve
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.results import Curve
+from chuteflow.checks import number_in
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.contents import curve_content, limits_passed, short
@@ -23,6 +25,7 @@ from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
 from chuteflow.io import contract
+from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
@@ -71,6 +74,7 @@ _LEFT_OUT = {
     "limits": "where the curve passes limits of the theory is left out",
     "map": "this column of the map is left out",
     "export": "this file is left out",
+    "data": "this file is not read",
     "stability": "the stability of this flow is left out",
 }
 
@@ -202,6 +206,16 @@ def _export(query: Query) -> Answer:
         return Answer(200, media[suffix], path.read_bytes(), path.name)
 
 
+def _data(query: Query) -> Answer:
+    """What was measured, from a file that was sent: its ``name`` and its ``content`` in base64."""
+    from chuteflow.explorer.data import read_sent
+
+    name, slope = queries.file_name(query), query.get("slope")
+    content = base64.b64decode(query["content"])
+    at = None if slope is None else PARAMETERS["slope"].checked(number_in("slope", slope, 0.0))
+    return _json({"data": read_sent(name, content, slope=at, scales=queries.scales(query))})
+
+
 #: What can be asked, by the last part of its address.
 QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "flows": _flows,
@@ -210,4 +224,5 @@ QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "map": _map,
     "stability": _stability,
     "export": _export,
+    "data": _data,
 }

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chuteflow.checks import number_in
+from chuteflow.checks import number_in, shown
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
@@ -168,6 +169,25 @@ def place(name: str, given: Query, count: int) -> int:
     if given[name] not in map(str, range(count)):
         raise InputError(f"{name} = {given[name][:40]!r}: there are {count}, counted from 0")
     return int(given[name])
+
+
+#: Characters of the name of a file that is sent, at most.
+_LONGEST_NAME = 200
+
+
+def file_name(given: Query) -> str:
+    """The name of a file that was sent, without folders.
+
+    Raises:
+        InputError: for a query with other names, or a file of another kind.
+    """
+    unknown = next((name for name in given if name not in ("name", "content", "slope", *GRAINS)), None)
+    if unknown is not None:
+        raise InputError(f"unknown parameter {unknown[:40]!r}")
+    name = re.split(r"[/\\]", given.get("name", ""))[-1]
+    if not name.lower().endswith((".csv", ".nc")) or not name.isprintable() or len(name) > _LONGEST_NAME:
+        raise InputError(f"{shown(name)}: must be a file .csv or .nc")
+    return name
 
 
 def scales(given: Query) -> Scales | None:

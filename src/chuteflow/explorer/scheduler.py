@@ -60,6 +60,7 @@ STAGES: Mapping[str, tuple[Stage, ...]] = {
     "limits": (Stage("slow", Limits(2.0, 20.0)),),
     "map": (Stage("drawing", Limits(2.0, 20.0)),),
     "export": (Stage("drawing", Limits(20.0, 100.0)),),
+    "data": (Stage("drawing", Limits(5.0, 30.0)),),
     "stability": (Stage("stability", Limits(20.0, 100.0)),),
 }
 #: Answers in the cache, questions of one address that are computed or wait, and clients whose turn is known: at most.
@@ -218,7 +219,8 @@ class Scheduler:
         self._running.pop(job.key, None)
         if not job.given.done():
             job.given.set_result(given)
-        if cache and given.name is None:
+        # Neither files to download nor those that were sent are worth the space.
+        if cache and given.name is None and job.question != "data":
             self._cache[job.key] = given
             if len(self._cache) > _CACHED:
                 self._cache.popitem(last=False)

@@ -16,8 +16,9 @@ from chuteflow.io.dataset import Dataset, variable
 from chuteflow.io.reading import loading
 from chuteflow.io.records import FORMAT
 from chuteflow.io.writing import require_suffix, write_file
+from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.free import free_parameter
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import FIELDS, NUMBERS, SCALED, Scales
 
 if TYPE_CHECKING:
     from chuteflow.fitting.calibration import Fit, Fitted
@@ -81,21 +82,27 @@ def comparison_object(found: Sequence[Fit], reasons: Sequence[str]) -> dict[str,
     return {"fits": [fit_object(one) for one in found], "failed": list(reasons)}
 
 
-def prediction_object(found: Prediction) -> dict[str, Any]:
-    """What ``chuteflow predict --json`` prints: values with standard errors, null where one is infinite."""
+def prediction_object(found: Prediction, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow predict --json`` prints: values with standard errors, null where one is infinite; in SI units
+    where there are scales."""
+
+    def by(name: str) -> float:
+        return contract.factor(name, found.calibration.chute, scales)
+
     return {
+        **contract.units_object(scales, SCALED),
         "chute": contract.chute_object(found.calibration.chute),
         "parameters": list(found.calibration.keys),
         "confidence": found.confidence,
         "reason": found.flow_set.reason,
         "flows": [
             {
-                "flow": contract.flow_object(one.flow),
-                "errors": {NUMBERS[n].symbol: contract.finite(error) for n, (_, error) in one.numbers.items()},
+                "flow": contract.flow_object(one.flow, scales),
+                "errors": {NUMBERS[n].symbol: contract.finite(by(n) * error) for n, (_, error) in one.numbers.items()},
                 "profiles": {
-                    "z": one.height.tolist(),
+                    "z": (by("height") * one.height).tolist(),
                     **{
-                        name: {"value": _numbers(pair[0]), "error": _numbers(pair[1])}
+                        name: {"value": _numbers(by(name) * pair[0]), "error": _numbers(by(name) * pair[1])}
                         for name, pair in one.profiles.items()
                     },
                 },
@@ -104,29 +111,35 @@ def prediction_object(found: Prediction) -> dict[str, Any]:
         ],
         "curve": [
             {
-                "Q": np.exp(band.points[:, 0]).tolist(),
-                "h": np.exp(band.points[:, 1]).tolist(),
+                "Q": (by("mass_flux") * np.exp(band.points[:, 0])).tolist(),
+                "h": (by("centre_of_mass") * np.exp(band.points[:, 1])).tolist(),
                 "normal": band.normals.tolist(),
                 "error": _numbers(band.errors),
             }
             for band in found.bands
         ],
         "folds": [
-            {"kind": one.kind, "value": one.value, "relative_error": contract.finite(one.error)} for one in found.folds
+            {
+                "kind": one.kind,
+                "value": by(CONDITIONS[one.turns].quantity) * one.value,
+                "relative_error": contract.finite(one.error),
+            }
+            for one in found.folds
         ],
         "warnings": found.warnings,
     }
 
 
-def design_object(found: Design) -> dict[str, Any]:
-    """What ``chuteflow design --json`` prints."""
+def design_object(found: Design, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow design --json`` prints; flows in SI units where there are scales, what is wanted without."""
     return {
+        **contract.units_object(scales, NUMBERS),
         "wanted": dict(found.wanted),
         "solutions": [
             {
                 "values": dict(zip((p.key for p in found.unknown), one.values.tolist(), strict=True)),
                 "chute": contract.chute_object(one.flow.chute),
-                "flow": contract.flow_object(one.flow),
+                "flow": contract.flow_object(one.flow, scales),
             }
             for one in found.solutions
         ],
@@ -135,14 +148,26 @@ def design_object(found: Design) -> dict[str, Any]:
     }
 
 
-def prediction_rows(found: Prediction) -> Iterator[list[Any]]:
-    """The profiles with their errors as rows of a table."""
+def design_rows(found: Design, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The chutes and their flows as rows of a table."""
+    units = {name: "" if scales is None else f" [{one.unit}]" for name, one in NUMBERS.items()}
+    yield [*BY_KEY, *(f"{one.symbol}{units[name]}" for name, one in NUMBERS.items())]
+    for one in found.solutions:
+        chute = one.flow.chute
+        numbers = [getattr(one.flow, name) * contract.factor(name, chute, scales) for name in NUMBERS]
+        yield [*(getattr(chute, parameter.name) for parameter in BY_KEY.values()), *numbers]
+
+
+def prediction_rows(found: Prediction, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The profiles with their errors as rows of a table, in SI units where there are scales."""
     names = [name for name in FIELDS if name != "height"]
-    cells = [cell for name in names for cell in (FIELDS[name].symbol, f"{FIELDS[name].symbol}_error")]
-    yield ["flow", "z", *cells]
+    by = {name: contract.factor(name, found.calibration.chute, scales) for name in FIELDS}
+    units = {name: "" if scales is None else f" [{one.unit}]" for name, one in FIELDS.items()}
+    cells = [f"{FIELDS[name].symbol}{what}{units[name]}" for name in names for what in ("", "_error")]
+    yield ["flow", f"z{units['height']}", *cells]
     for i, one in enumerate(found.flows, 1):
-        columns = [values for name in names for values in one.profiles[name]]
-        yield from ([i, *row] for row in np.column_stack([one.height, *columns]).tolist())
+        columns = [by[name] * values for name in names for values in one.profiles[name]]
+        yield from ([i, *row] for row in np.column_stack([by["height"] * one.height, *columns]).tolist())
 
 
 def _numbers(values: Any) -> list[float | None]:

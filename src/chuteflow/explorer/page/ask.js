@@ -26,6 +26,16 @@ export async function ask(question, query, signal) {
   }
 }
 
+/** The answer to a file that is sent. */
+export async function send(where, query, file) {
+  try {
+    const response = await fetch(`${where}?${new URLSearchParams(query)}`, { method: "POST", body: file, headers: { "x-status": "in-answer" } });
+    return await response.json();
+  } catch {
+    return { error: "the server does not answer: is chuteflow explore still running?" };
+  }
+}
+
 /** What can be set, cases and quantities. */
 export const askAbout = async () => standalone?.about ?? (await fetch("about")).json();
 

@@ -6,7 +6,7 @@ import * as curve from "./curve.js";
 import * as chutePicture from "./grains.js";
 import { standalone } from "./standalone.js";
 import * as map from "./map.js";
-import { byId, escaped, flowColour, forgetColours, sentence, showMessage } from "./page.js";
+import { byId, download, escaped, flowColour, forgetColours, sentence, showMessage } from "./page.js";
 import * as measurements from "./measured.js";
 import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
@@ -17,7 +17,7 @@ import { factor, setQuantities, unit } from "./units.js";
 
 const about = await askAbout();
 setQuantities(about.quantities);
-start(about.presets[0].state, about.fixed);
+start({ ...about.presets[0].state, ...about.first }, about.fixed);
 byId("version").textContent = about.version;
 
 let flows = null, mark = 0;
@@ -180,6 +180,22 @@ whole.className = "served";
 whole.innerHTML = 'This chute at every flux, as one page that needs no server: <a href="#" download data-export="page-html">HTML</a>';
 exported(whole.querySelector("a"), "page", "html");
 byId("exports").append(whole);
+whole.querySelector("a").addEventListener("click", async (event) => {
+  const data = measurements.shown();
+  if (!data.length) return;
+  // The server does not know what was loaded here: it is put into the page that the server makes.
+  event.preventDefault();
+  showMessage("export", "");
+  const page = await (await fetch(event.target.href)).text();
+  const place = /(<script type="application\/json" id="standalone-data">)([^<]*)(<\/script>)/;
+  if (!place.test(page)) { showMessage("export", "The page that needs no server is left out: ask again, or use chuteflow explore --export."); return; }
+  const filled = page.replace(place, (_, begin, content, end) => {
+    const parts = JSON.parse(content);
+    parts.about.data = data;
+    return begin + JSON.stringify(parts).replaceAll("<", "\\u003c") + end;
+  });
+  download("chuteflow.html", new Blob([filled], { type: "text/html" }));
+});
 
 for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEventListener("click", async () => {
   write();

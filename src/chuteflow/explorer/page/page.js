@@ -8,7 +8,7 @@ export const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.c
 export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`;
 
 // Messages of the server are shown before those on typed text.
-const messages = { flows: "", curve: "", typed: "" };
+const messages = { flows: "", curve: "", export: "", typed: "" };
 
 /** Show a message of what is wrong, by its source; an empty text removes it. */
 export function showMessage(from, text) {

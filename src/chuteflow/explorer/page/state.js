@@ -61,7 +61,8 @@ addEventListener("popstate", () => {
 export function onChange(listen) { listeners.push(listen); }
 
 export function address() {
-  const shown = Object.entries(state).filter(([name, value]) => defaults[name] !== value);
+  // What the page opens with need not be what others open with.
+  const shown = Object.entries(state).filter(([name, value]) => defaults[name] !== value || first[name] !== value);
   return `${location.pathname}?${new URLSearchParams(shown)}`;
 }
 
