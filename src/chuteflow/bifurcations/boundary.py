@@ -17,7 +17,7 @@ from chuteflow.bifurcations.starting_points import followed
 from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL, BoundaryTracing, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.results import LineOfFlows, Searched
+from chuteflow.branches.results import Searched
 from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
@@ -27,6 +27,7 @@ from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 from chuteflow.theory.constitutive import require_height
