@@ -48,7 +48,7 @@ CONTROLS = {
         False,
         "How deep a grain sinks between the grains fixed to the base.",
     ),
-    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time, in ρd√(gd cos θ)."),
+    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time; if not in SI, in ρd√(gd cos θ)."),
 }
 
 
