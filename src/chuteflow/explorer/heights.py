@@ -14,8 +14,8 @@ Sampler = Callable[[Array], Array]
 #: Height and fields (1 + fields, k) of a flow at logarithms (k,) of the fraction of the mass that lies above.
 OverburdenSampler = Callable[[Array], Array]
 
-#: Where the logarithm is looked at to begin with, down to a fraction so small that nothing lies above, and the number of
-#: intervals at first.
+#: Where the logarithm is looked at first, down to a fraction so small that nothing lies above, and the number of
+#: intervals to begin with.
 _SCOUTS, _AT_FIRST = -600.0 * 2.0 ** np.arange(-9.0, 1.0), 16
 #: Heights that differ by less than this fraction of the top are one.
 _ALIKE = 1e-6
