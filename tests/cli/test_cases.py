@@ -303,6 +303,7 @@ def every_command():
     """All commands by name, those of groups too."""
     for name in COMMANDS:
         command = program.get_command(click.Context(program), name)
+        assert command is not None
         parts = command.commands if isinstance(command, click.Group) else None
         yield from [(name, command)] if parts is None else [(f"{name} {part}", one) for part, one in parts.items()]
 

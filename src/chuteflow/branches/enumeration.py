@@ -29,7 +29,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.flow import flows_of
+from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 from chuteflow.threads import on_one_thread
@@ -123,18 +123,8 @@ def flows(
 def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> FlowSet:
     """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
     tolerance = checked_tolerance(tolerance)
-    if which in (LOG_T, LOG_M):
-        # Well inside, so that a turn near the value is seen from both sides.
-        within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
     problem = model(chute)
-    found = _search(problem, which, value, tolerance, within)
-    for _ in range(_EXTENSIONS):
-        wider = _wider(found, which, value)
-        if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
-            break
-        # The grid over another range resolves other flows.
-        before, found = found, _search(problem, which, value, tolerance, wider)
-        found = replace(found, solutions=_distinct([*found.solutions, *before.solutions], which))
+    found = _search_and_extend(problem, which, value, tolerance, within)
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
@@ -147,30 +137,60 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
     )
 
 
+@on_one_thread
+@np.errstate(under="ignore")
+def solve_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> tuple[Flow, ...]:
+    """The flows of :func:`flows_within` alone: for very many chutes, of which nothing else is asked."""
+    found = _search_and_extend(model(chute), which, value, checked_tolerance(tolerance), within)
+    return tuple(flows_of(chute, found.solutions))
+
+
 @dataclass(frozen=True, eq=False)
 class _BranchSearch:
     """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
-    rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
+    rough quantities of flows that were seen and not solved, and of places that could not be solved to tell; and the
+    ``grid`` of the search."""
 
     within: SearchRange
     branches: tuple[SolutionBranch, ...]
     solutions: list[Solution]
     beyond: list[Solution]
     lost: list[Array]
+    unsure: list[Array]
     grid: TrajectoryGrid
+
+
+def _search_and_extend(
+    problem: Model, which: int, value: float, tolerance: float, within: SearchRange
+) -> _BranchSearch:
+    """The flows in a range, and beyond it where a branch leads out of it towards the value."""
+    if which in (LOG_T, LOG_M):
+        # Well inside, so that a turn near the value is seen from both sides.
+        within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
+    found = _search(problem, which, value, tolerance, within)
+    for _ in range(_EXTENSIONS):
+        wider = _wider(found, which, value)
+        if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
+            break
+        # The grid over another range resolves other flows.
+        before, found = found, _search(problem, which, value, tolerance, wider)
+        found = replace(found, solutions=_distinct([*found.solutions, *before.solutions], which))
+    return found
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: SearchRange) -> _BranchSearch:
     found = find_branches(problem, within)
     solutions: list[Solution] = []
     lost: list[Array] = []
+    unsure: list[Array] = []
     for branch in found:
-        solved, missed = solve_crossings(branch, which, value, tolerance)
+        solved, missed, untold = solve_crossings(branch, which, value, tolerance)
         solutions += solved
         lost += missed
+        unsure += untold
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _BranchSearch(within, found, inside, beyond, lost, search_range(problem, within))
+    return _BranchSearch(within, found, inside, beyond, lost, unsure, search_range(problem, within))
 
 
 def check_condition(given: Mapping[str, Any]) -> tuple[int, float]:
@@ -214,7 +234,7 @@ def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapo
 
 def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
+    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value, found.unsure)
     if left is not None:
         return left
     for lead in _leads(found, which, value):

@@ -342,6 +342,9 @@ search_options = _options(
     search_range_options,
 )
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no notes on standard error.")
+flow_option = option(
+    "--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default)."
+)
 
 
 def output_options(saved: Sequence[str] = SAVED, plotted: str | None = "") -> Callable[[Command], Command]:
@@ -632,11 +635,44 @@ def deliver_without_flow(
     click.echo(contract.text(content) if given["as_json"] else "\n".join(text))
 
 
+def solve_one(
+    given: Mapping[str, Any],
+    chute: Chute,
+    condition: Mapping[str, Any],
+    scales: Scales | None,
+    empty: Mapping[str, Any],
+) -> Flow | None:
+    """The flow that --flow names of those under the condition; None where there is none, once that is printed, see
+    :func:`deliver_without_flow`.
+
+    Raises:
+        InputError: for a number that no flow has.
+    """
+    from chuteflow.branches.enumeration import flows
+
+    found = flows(chute, **condition)
+    if len(found):
+        return chosen(found, given["which"])
+    deliver_without_flow(given, found, condition, scales, empty)
+    return None
+
+
+def saver(result: Any, scales: Scales | None = None) -> Callable[[str], None]:
+    """What writes a result to a path, see :func:`chuteflow.save`."""
+
+    def save(path: str) -> None:
+        from chuteflow.io import files
+
+        files.save(result, path, scales=scales)
+
+    return save
+
+
 def deliver_object(
     given: Mapping[str, Any],
     content: Any,
     report: Iterable[str],
-    rows: Callable[[], Iterable[Sequence[str]]],
+    rows: Callable[[], Iterable[Sequence[Any]]],
     plot: Callable[[], Figure] | None,
 ) -> None:
     """Print the object ``content`` with --json, else the lines of ``report``; write it, or ``rows``, to the file that
@@ -645,22 +681,21 @@ def deliver_object(
     Raises:
         InputError: once the answer is printed, for files that could not be written.
     """
-    from chuteflow.io import contract
     from chuteflow.io.files import write_answer
 
-    answer = contract.text(content) if given["as_json"] else "\n".join(report)
-    deliver(given, answer, lambda path: write_answer(path, lambda: content, rows), plot)
+    deliver(given, lambda: content, report, lambda path: write_answer(path, lambda: content, rows), plot)
 
 
 def deliver(
     given: Mapping[str, Any],
-    answer: str,
+    content: Callable[[], Any],
+    report: Iterable[str],
     save: Callable[[str], None] | None,
     plot: Callable[[], Figure] | None,
     **pictures: Callable[[], Figure],
 ) -> None:
     """Write the files that --save and --plot, where the command has them, and options of ``pictures`` name, and print
-    the answer.
+    the object ``content`` with --json, else the lines of ``report``.
 
     No full disk is to cost the answer.
 
@@ -677,6 +712,9 @@ def deliver(
             for one in picture_files(path):
                 write_figure(drawn, one)
 
+    from chuteflow.io import contract
+
+    answer = contract.text(content()) if given["as_json"] else "\n".join(report)
     failures = []
     if plot is not None:
         pictures = {"plot": plot, **pictures}

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.fitting.calibration import Calibration
 from chuteflow.io import contract, records
+from chuteflow.io.dataset import Dataset, variable
 from chuteflow.io.reading import loading
 from chuteflow.io.records import FORMAT
-from chuteflow.io.writing import require_suffix, require_writable, write_whole
+from chuteflow.io.writing import require_suffix, write_file
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.free import free_parameter
 from chuteflow.steady.quantities import FIELDS, NUMBERS, SCALED, Scales
@@ -148,19 +148,18 @@ def design_object(found: Design, scales: Scales | None = None) -> dict[str, Any]
     }
 
 
-def design_rows(found: Design, scales: Scales | None = None) -> Iterator[list[str]]:
-    """The chutes and their flows as rows of CSV."""
+def design_rows(found: Design, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The chutes and their flows as rows of a table."""
     units = {name: "" if scales is None else f" [{one.unit}]" for name, one in NUMBERS.items()}
     yield [*BY_KEY, *(f"{one.symbol}{units[name]}" for name, one in NUMBERS.items())]
     for one in found.solutions:
         chute = one.flow.chute
         numbers = [getattr(one.flow, name) * contract.factor(name, chute, scales) for name in NUMBERS]
-        values = [*(getattr(chute, parameter.name) for parameter in BY_KEY.values()), *numbers]
-        yield ["" if contract.finite(value) is None else repr(float(value)) for value in values]
+        yield [*(getattr(chute, parameter.name) for parameter in BY_KEY.values()), *numbers]
 
 
-def prediction_rows(found: Prediction, scales: Scales | None = None) -> Iterator[list[str]]:
-    """The profiles with their errors as rows of CSV, in SI units where there are scales."""
+def prediction_rows(found: Prediction, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The profiles with their errors as rows of a table, in SI units where there are scales."""
     names = [name for name in FIELDS if name != "height"]
     by = {name: contract.factor(name, found.calibration.chute, scales) for name in FIELDS}
     units = {name: "" if scales is None else f" [{one.unit}]" for name, one in FIELDS.items()}
@@ -168,8 +167,7 @@ def prediction_rows(found: Prediction, scales: Scales | None = None) -> Iterator
     yield ["flow", f"z{units['height']}", *cells]
     for i, one in enumerate(found.flows, 1):
         columns = [by[name] * values for name in names for values in one.profiles[name]]
-        for z, *row in zip(by["height"] * one.height, *columns, strict=True):
-            yield [str(i), repr(float(z)), *("" if not np.isfinite(v) else repr(float(v)) for v in row)]
+        yield from ([i, *row] for row in np.column_stack([by["height"] * one.height, *columns]).tolist())
 
 
 def _numbers(values: Any) -> list[float | None]:
@@ -219,16 +217,20 @@ def save_fit(found: Fit, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: for another ending, or a file that cannot be written.
     """
-    kept: dict[str, Any] = {"format": FORMAT, "kind": KIND, "fit": fit_object(found)}
-    if require_writable(path, SAVED) == ".json":
-        write_whole(path, contract.text(kept) + "\n")
-        return
-    from chuteflow.io import netcdf_file
 
-    stream = BytesIO()
-    with netcdf_file.create(stream) as file:
-        _write(file, found, contract.text(kept).encode())
-    write_whole(path, stream.getvalue())
+    def write_json(stream: BinaryIO) -> None:
+        stream.write(_kept(found) + b"\n")
+
+    def write_netcdf(stream: BinaryIO) -> None:
+        from chuteflow.io.netcdf_file import write_groups
+
+        write_groups(stream, _dataset(found))
+
+    write_file(path, {".nc": write_netcdf, ".json": write_json})
+
+
+def _kept(found: Fit) -> bytes:
+    return contract.text({"format": FORMAT, "kind": KIND, "fit": fit_object(found)}).encode()
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -267,38 +269,36 @@ def _content(path: Path) -> bytes:
         return bytes(stored[...].tobytes())
 
 
-def _write(file: Any, found: Fit, content: bytes) -> None:
+def _dataset(found: Fit) -> Dataset:
+    """The estimates, the residuals and, as bytes, all that predictions are made from."""
     from chuteflow import __version__
 
-    k = len(found.free)
-    file.dimensions = {"parameter": k, "parameter_2": k, "end": 2, "byte": len(content)}
     names = " ".join(p.key for p in found.free)
-    file.attrs.update(
-        {
-            "Conventions": "CF-1.11",
-            "title": "Parameters of a chute from measurements",
-            "source": f"chuteflow {__version__}",
-            "parameters": names,
-            "chi2": found.chi2,
-            "values": found.count,
-            "unknowns": found.unknowns,
-            **found.chute.as_dict(),
-        }
-    )
-
-    def put(name: str, dimensions: tuple[str, ...], values: Any, said: str) -> None:
-        variable = file.create_variable(name, dimensions, values.dtype, data=values)
-        variable.attrs.update({"long_name": said, "units": "1"})
-
-    ends = np.array([[one.interval.low, one.interval.high] for one in found.estimates], dtype=float).reshape(k, 2)
-    put("estimate", ("parameter",), found.values.astype(float), f"estimates of {names}")
-    put("interval", ("parameter", "end"), ends, f"intervals of confidence {found.confidence:g}")
-    put("covariance", ("parameter", "parameter_2"), found.covariance, "covariance of the estimates")
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": "Parameters of a chute from measurements",
+        "source": f"chuteflow {__version__}",
+        "parameters": names,
+        "chi2": found.chi2,
+        "values": found.count,
+        "unknowns": found.unknowns,
+        **found.chute.as_dict(),
+    }
+    ends = np.array([[one.interval.low, one.interval.high] for one in found.estimates], dtype=float)
+    intervals = ends.reshape(len(found.free), 2)
+    variables = {
+        "estimate": variable(("parameter",), found.values.astype(float), f"estimates of {names}"),
+        "interval": variable(("parameter", "end"), intervals, f"intervals of confidence {found.confidence:g}"),
+        "covariance": variable(("parameter", "parameter_2"), found.covariance, "covariance of the estimates"),
+    }
     for i, one in enumerate(found.experiments, 1):
         for series, residual in one.profiles:
-            name = f"experiment_{i}_{series.symbol}"
-            file.dimensions[name] = len(residual)
-            put(f"{name}_height", (name,), series.height, f"heights of {series.symbol} in experiment {one.name}")
-            put(f"{name}_value", (name,), series.value, f"measured {series.symbol} in experiment {one.name}")
-            put(f"{name}_residual", (name,), residual, "computed minus measured, in standard errors")
-    put("fit", ("byte",), np.frombuffer(content, dtype="u1"), "everything, as a JSON text")
+            name, where = f"experiment_{i}_{series.symbol}", f"{series.symbol} in experiment {one.name}"
+            for part, values, said in (
+                ("height", series.height, f"heights of {where}"),
+                ("value", series.value, f"measured {where}"),
+                ("residual", residual, "computed minus measured, in standard errors"),
+            ):
+                variables[f"{name}_{part}"] = variable((name,), values, said)
+    content = np.frombuffer(_kept(found), dtype="u1")
+    return Dataset({**variables, "fit": variable(("byte",), content, "everything, as a JSON text")}, attributes)

@@ -9,7 +9,7 @@ from itertools import groupby
 
 from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
-from chuteflow.branches.results import Curve, Searched
+from chuteflow.branches.results import Curve, FlowSet, Searched
 from chuteflow.io.contract import factor
 from chuteflow.io.tables import number
 from chuteflow.parameters import CONDITIONS, PARAMETERS
@@ -27,6 +27,23 @@ _INTERIORS = {
     "productive": "interior productive throughout",
     "mixed": "interior productive in some places and dissipative in others (mixed)",
 }
+
+
+def introduction(chute_: Chute, scales_: Scales | None) -> Iterator[str]:
+    """The chute of a report, and with scales its grains."""
+    yield chute(chute_)
+    if scales_ is not None:
+        yield scales(scales_)
+
+
+def search_outcome(found: FlowSet | Curve, scales: Scales | None, near: Sequence[str] = ()) -> Iterator[str]:
+    """Why there is no flow, followed by the lines ``near``; whether there may be more; and the range searched."""
+    if found.reason:
+        yield in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
+    if found.incomplete:
+        yield in_own_units(f"there may be more: {found.incomplete}", scales)
+    yield searched(found.searched, found.chute, scales)
 
 
 def among(flow: Flow, flows: Sequence[Flow]) -> str:

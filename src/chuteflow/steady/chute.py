@@ -24,8 +24,8 @@ class Chute:
 
     Args:
         slope: tan(theta) > 0.
-        restitution: e of two grains, 0 < e <= 1.
-        wall_restitution: e_w of a grain and the base, 0 <= e_w <= 1.
+        restitution: e, the coefficient of restitution of two grains, 0 < e <= 1.
+        wall_restitution: e_w, the coefficient of restitution of a grain and the base, 0 <= e_w <= 1.
         roughness: r of (2.8), 1/2 <= r <= sqrt(3)/2.
         surface: "free" or "interface".
         closure: the constitutive law: its name, a text such as "extended:packing=0.64" or "grains.py:OWN" (see

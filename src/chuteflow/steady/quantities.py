@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from chuteflow.amounts import bare, is_like, positive_amount, read_si
 from chuteflow.checks import number
@@ -263,6 +264,10 @@ class Scales:
     diameter: float
     density: float
     gravity: float = 9.81
+
+    if TYPE_CHECKING:
+
+        def __init__(self, diameter: float | str, density: float | str, gravity: float | str = 9.81) -> None: ...
 
     def __post_init__(self) -> None:
         for name, unit in GRAINS.items():

@@ -54,7 +54,9 @@ _SAVED = (".json", ".csv")
 )
 @options.option("--roughness", type=options.Number(), help="Roughness r, instead of that of the run.")
 @options.option(
-    "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not give it."
+    "--ew",
+    type=options.Number(),
+    help="Coefficient of restitution of a grain and the base, if not in the run.",
 )
 @options.option("--fit", metavar="NAMES", help="Find these parameters from the profiles too, such as e,ew,roughness.")
 @options.output_options(_SAVED, "profiles and functions")

@@ -179,8 +179,9 @@ def waves_command(source: str, **given: Any) -> None:
     grown = waves.growth(fitted)
     click.echo(
         f"a wave of length {number(2.0 * math.pi / found.wavenumber)}, k = {number(found.wavenumber)}, from t = "
-        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)}, frequency "
-        f"{number(grown.frequency)}; that explains {100.0 * grown.explained:.3g} % of its mean square"
+        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)} ± {grown.rate_error:.1g}, "
+        f"frequency {number(grown.frequency)} ± {grown.frequency_error:.1g}; that explains "
+        f"{100.0 * grown.explained:.3g} % of its mean square"
     )
     if given["save"] is not None:
         write_whole(given["save"], waves.written(found))
@@ -206,7 +207,7 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
             found.append(one)
             progress.show(f"{len(found)} flows compared")
     text = tables.table(table(found, names), words=(0, 5))
-    options.deliver(given, text, None, lambda: plot_results(found))
+    options.deliver({**given, "as_json": False}, dict, [text], None, lambda: plot_results(found))
 
 
 def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:

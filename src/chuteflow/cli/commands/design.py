@@ -55,7 +55,8 @@ def _wanted(given: dict[str, Any], slope: float | None, scales: Scales | None) -
     found = {}
     for condition in CONDITIONS.values():
         if given[condition.option] is not None:
-            option, value = f"--{condition.option.replace('_', '-')}", given[condition.option]
+            option = f"--{condition.option.replace('_', '-')}"
+            value: Any = given[condition.option]
             if slope is not None:
                 value = options.amount(given, condition.option, condition.quantity, slope, scales)
             elif options.without_unit(value)[1]:
@@ -77,10 +78,8 @@ def _report(found: Design, scales: Scales | None) -> Iterator[str]:
     if found.reason:
         yield f"no solution: {found.reason}"
         return
-    names, *units = tables.heading(_COLUMNS, scales)
-    unknown = [p.key for p in found.unknown]
-    rows = [["", *unknown, *names, "validity"]]
-    rows += [["", *("" for _ in unknown), *cells, ""] for cells in units]
+    before = [("", ""), *((parameter.key, "") for parameter in found.unknown)]
+    rows = tables.heading(_COLUMNS, scales, before=before, after=(("validity", ""),))
     for i, one in enumerate(found.solutions, 1):
         cells = tables.numbers(one.flow, _COLUMNS, one.flow.chute, scales)
         rows.append([str(i), *map(tables.number, one.values.tolist()), *cells, one.flow.validity.summary])

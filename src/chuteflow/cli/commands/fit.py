@@ -83,8 +83,7 @@ def command(**given: Any) -> None:
     chute = chute_with(given, [*free, "slope"], closure=closures[0], settings=())
     scales = options.scales(given)
     from chuteflow.fitting.comparison import compare
-    from chuteflow.io import contract
-    from chuteflow.io.fit_records import comparison_object
+    from chuteflow.io.fit_records import comparison_object, save_fit
     from chuteflow.io.measurements_file import read_measurements
 
     slope = None if given["slope"] is None and given["angle"] is None else chute.slope
@@ -96,15 +95,6 @@ def command(**given: Any) -> None:
     with Progress(seconds=0.5) as progress:
         settings["progress"] = lambda fraction: progress.show(f"{fraction:.0%} of the trial chutes")
         found = compare(measured, chute, free, closures, **settings)
-    if given["as_json"]:
-        answer = contract.text(comparison_object(found.fits, found.failed))
-    else:
-        answer = "\n".join(_report(found, scales))
-
-    def save(path: str) -> None:
-        from chuteflow.io.fit_records import save_fit
-
-        save_fit(found.fits[0], path)
 
     def plotted() -> Figure:
         from chuteflow.plotting.fit_plot import plot_fit
@@ -119,7 +109,14 @@ def command(**given: Any) -> None:
             raise InputError("--direct: no experiment has profiles of nu and T at five common heights")
         return plot_direct(measured_directly)
 
-    options.deliver(given, answer, save, plotted, direct=drawn)
+    options.deliver(
+        given,
+        lambda: comparison_object(found.fits, found.failed),
+        _report(found, scales),
+        lambda path: save_fit(found.fits[0], path),
+        plotted,
+        direct=drawn,
+    )
 
 
 def _names(text: str | None) -> list[str]:

@@ -36,8 +36,8 @@ _COLUMNS = (
 @click.argument("fitted", metavar="FIT")
 @options.option("--slope", type=options.Number(), help="Slope tan(theta); that of the fit by default.")
 @options.option("--angle", type=options.Number(), help="Inclination theta in degrees.")
-@options.option("--e", type=options.Number(), help="Another restitution of two grains.")
-@options.option("--ew", type=options.Number(), help="Another restitution of a grain and the base.")
+@options.option("--e", type=options.Number(), help="Another coefficient of restitution of two grains.")
+@options.option("--ew", type=options.Number(), help="Another coefficient of restitution of a grain and the base.")
 @options.option("--roughness", type=options.Number(), help="Another roughness of the base.")
 @options.condition_options
 @options.grains_options
