@@ -35,8 +35,9 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import BaseState
+from chuteflow.steady.chute import Chute
 from chuteflow.theory import bases
-from chuteflow.theory.constitutive import Coefficients
+from chuteflow.theory.constitutive import Coefficients, Law
 from chuteflow.theory.transport import Fields, Material, Motion, Vector, base_conditions, motion
 
 #: Order of the unknowns n, u, v, w, tau, each at all nodes from the top to the base, with omega for the first n.
@@ -118,22 +119,21 @@ def steady_motion(base: BaseState) -> Motion:
     def gradient(f: Any) -> Vector:
         return (0.0 * f, 0.0 * f, base.derivative @ f)
 
-    return motion(_steady(base), gradient, grains(base))
+    return motion(_steady(base), gradient, grains(base.flow.chute, base.flow.law))
 
 
-def grains(base: BaseState) -> Material:
-    """The law of the chute.
+def grains(chute: Chute, law: Law) -> Material:
+    """The grains of disturbed flows on ``chute``, with its ``law``.
 
     Raises:
         InputError: for a law that is known for steady flows alone, and for the interface condition.
     """
-    chute = base.flow.chute
     if chute.surface != "free":
         raise InputError(
             f"stability with the surface {chute.surface!r}: its conditions are known for a steady, level interface "
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
-    return Material(base.flow.law, chute.restitution, chute.slope)
+    return Material(law, chute.restitution, chute.slope)
 
 
 def operator(base: BaseState) -> Operator:
@@ -169,7 +169,7 @@ def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
         return along, across, FirstOrder(base.derivative @ f.value, base.derivative @ f.slope)
 
     fields = Fields(numbers[DENSITY], (numbers[ALONG], numbers[ACROSS], numbers[UP]), numbers[HEAT])
-    moving = motion(fields, gradient, grains(base))
+    moving = motion(fields, gradient, grains(base.flow.chute, base.flow.law))
     matrix = np.concatenate([force.slope for force in moving.forces]).astype(complex)
     weights = np.concatenate([np.ones(base.points), *(inertia.value for inertia in moving.inertia[1:])])
     chute = base.flow.chute
