@@ -9,8 +9,10 @@ from chuteflow import Chute, flows
 from chuteflow.numerics.chebyshev import split_grid
 from chuteflow.numerics.eigenproblem import refine_eigenvalue
 from chuteflow.stability.base import Resolution, base
+from chuteflow.stability.layer import FIELDS, Layer
 from chuteflow.stability.linear import operator
 from chuteflow.stability.modes import Disturbances
+from chuteflow.stability.relaxation import disturb
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.extended import Extended
 
@@ -85,3 +87,33 @@ def test_fields_of_a_mode_are_sampled_across_the_break():
     height, fields = mode.sampled(301)
     at = np.interp(height, mode.height[::-1], np.real(mode.fields[3])[::-1])
     assert np.real(fields[3]) == pytest.approx(at, abs=2e-3)
+
+
+def test_a_flow_in_time_is_steady_and_its_rates_converge_as_for_a_smooth_law():
+    flow = flows(Chute(0.3, 0.8, 0.8, 0.6, closure="extended"), M=2.1695)[-1]
+    rates = []
+    for degree in (32, 40, 56):
+        layer = Layer.of(flow, degree)
+        assert len(layer.breaks) == 2
+        state = layer.steady(flow)
+        assert np.abs(layer.rate(state)).max() < 1e-5
+        assert layer.numbers(state)[0] == pytest.approx(flow.mass_flux, rel=1e-13)
+        every = layer.growth_rates(state)
+        rates.append(every[np.abs(every.imag) > 1.0][0])
+    assert rates[1].real == pytest.approx(rates[2].real, abs=1e-7)
+    assert rates[0].real == pytest.approx(rates[2].real, abs=1e-6)
+
+
+def test_the_balance_of_energy_holds_on_pieces():
+    """dE/dt along the motion, by differences, is the work of gravity less what collisions take."""
+    flow = flows(Chute(0.3, 0.8, 0.8, 0.6, closure="extended"), M=2.1695)[-1]
+    layer = Layer.of(flow, 24)
+    assert layer.breaks
+    state = disturb(layer.steady(flow), 1.3, 0.8)
+    below = layer.mass / layer.mass_holdup
+    state.reshape(FIELDS, -1)[2] = 0.01 * np.sin(3.0 * below) * (1.0 - below)
+    rate = layer.rate(state)
+    ahead, behind = (layer.energy(state + way * 1e-7 * rate).total for way in (1.0, -1.0))
+    power = layer.power(state)
+    assert (ahead - behind) / 2e-7 == pytest.approx(power.net, abs=1e-6 * (power.gravity + power.collisions))
+    assert layer.weights.sum() == pytest.approx(flow.mass_holdup, rel=1e-13)
