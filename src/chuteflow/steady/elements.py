@@ -179,19 +179,12 @@ class Elements:
         """What integrals are taken with, see :func:`_rule`."""
         return _rule(self.model.beta if self.model.unlimited else 0.0)
 
-    @property
-    def inner_places(self) -> Array:
-        """The ends of the grid, and the Gauss points of all elements between them, ascending."""
-        s = kernel.places(self.breaks, _GAUSS[0])
-        inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
-        return np.concatenate([s[:1], inner, s[-1:]])
-
     def crossings(self, levels: Array, close: float) -> Array:
         """The places, to ``close``, at which ln x passes one of the ``levels`` (k,)."""
         model = self.model
         found = kernel.crossings(
-            self.breaks, self.ends, self.slopes, _CARDINAL, self.stretch, float(np.exp(self.log_mass)),
-            model.surface_stress, float(np.real(model.beta)), self.inner_places, levels, close,
+            self.breaks, self.ends, self.slopes, _CARDINAL, _GAUSS[0], _INTEGRALS, self.stretch,
+            float(np.exp(self.log_mass)), model.surface_stress, float(np.real(model.beta)), levels, close,
         )  # fmt: skip
         return np.asarray(found, dtype=float)
 
