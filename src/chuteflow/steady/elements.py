@@ -30,7 +30,7 @@ _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
 #: Ends of elements in the first one, in parts of it, where T has no limit at the surface.
-_GRADED = 0.4 ** np.arange(12, 0, -1.0)
+_GRADED = 0.4 ** np.arange(8, 0, -1.0)
 #: Ends of pieces of a grid there, in parts of the first of the others, which are not smaller than the second number.
 _COARSE, _SMOOTH = 0.125 ** np.arange(8, 0, -1.0), 1e-3
 #: A piece of a grid is not shorter than this.
