@@ -29,7 +29,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import DEEPEST, LARGEST_HOLDUP, SURFACE_TEMPERATURE, WIDEST
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.steady.flow import flows_of
+from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import Model, model
 from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
 from chuteflow.threads import on_one_thread
@@ -123,18 +123,8 @@ def flows(
 def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> FlowSet:
     """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
     tolerance = checked_tolerance(tolerance)
-    if which in (LOG_T, LOG_M):
-        # Well inside, so that a turn near the value is seen from both sides.
-        within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
     problem = model(chute)
-    found = _search(problem, which, value, tolerance, within)
-    for _ in range(_EXTENSIONS):
-        wider = _wider(found, which, value)
-        if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
-            break
-        # The grid over another range resolves other flows.
-        before, found = found, _search(problem, which, value, tolerance, wider)
-        found = replace(found, solutions=_distinct([*found.solutions, *before.solutions], which))
+    found = _search_and_extend(problem, which, value, tolerance, within)
     return FlowSet(
         chute=chute,
         flows=tuple(flows_of(chute, found.solutions)),
@@ -145,6 +135,14 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
         else explain_none_found(problem, [f.macroscopic for f in found.branches], which, value, found.within),
         incomplete=_left_out(found, which, value),
     )
+
+
+@on_one_thread
+@np.errstate(under="ignore")
+def solve_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> tuple[Flow, ...]:
+    """The flows of :func:`flows_within` alone: for very many chutes, of which nothing else is asked."""
+    found = _search_and_extend(model(chute), which, value, checked_tolerance(tolerance), within)
+    return tuple(flows_of(chute, found.solutions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +158,24 @@ class _BranchSearch:
     lost: list[Array]
     unsure: list[Array]
     grid: TrajectoryGrid
+
+
+def _search_and_extend(
+    problem: Model, which: int, value: float, tolerance: float, within: SearchRange
+) -> _BranchSearch:
+    """The flows in a range, and beyond it where a branch leads out of it towards the value."""
+    if which in (LOG_T, LOG_M):
+        # Well inside, so that a turn near the value is seen from both sides.
+        within = within.reaching(which, 1.5 * value).reaching(which, value / 1.5)
+    found = _search(problem, which, value, tolerance, within)
+    for _ in range(_EXTENSIONS):
+        wider = _wider(found, which, value)
+        if wider == found.within or found.grid.deepest < found.within.deepest * (1.0 - 1e-9):
+            break
+        # The grid over another range resolves other flows.
+        before, found = found, _search(problem, which, value, tolerance, wider)
+        found = replace(found, solutions=_distinct([*found.solutions, *before.solutions], which))
+    return found
 
 
 def _search(problem: Model, which: int, value: float, tolerance: float, within: SearchRange) -> _BranchSearch:

@@ -21,11 +21,26 @@ _DENSITIES = np.append(0.0, np.logspace(-9.0, 12.0, 2000))
 def explain_none_found(model: Model, branches: Sequence[Array], which: int, value: float, within: SearchRange) -> str:
     """One sentence on why no flow was found, given the quantities (k, 4) of the branches that were."""
     if branches:
-        spans = [np.exp([f[:, which].min(), f[:, which].max()]) for f in branches]
+        spans = [np.exp([_least(f, f[:, which]), -_least(f, -f[:, which])]) for f in branches]
         ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
         return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"
     return f"{explain_imbalance(model)} ({_searched(within)})"
+
+
+def _least(places: Array, values: Array) -> float:
+    """The least of ``values`` (k,) along a branch through ``places`` (k, 4), by the parabola through the smallest of
+    them and its neighbours."""
+    i = int(values.argmin())
+    if not 0 < i < len(values) - 1:
+        return float(values[i])
+    before, after = (float(np.linalg.norm(places[k] - places[i])) for k in (i - 1, i + 1))
+    if before == 0.0 or after == 0.0:
+        return float(values[i])
+    down, up = (values[i - 1] - values[i]) / before, (values[i + 1] - values[i]) / after
+    bend = (down + up) / (before + after)
+    slope = up - bend * after
+    return float(values[i] - (0.25 * slope**2 / bend if bend > 0.0 else 0.0))
 
 
 def explain_imbalance(model: Model) -> str:

@@ -79,14 +79,15 @@ class Zeros:
         rows = grid.steps_of(zeros[:, :2].astype(np.int64))
         places = np.where(rows[:, 0] == rows[:, 1], zeros[:, 0] + zeros[:, 2], zeros[:, 1])
         return kernel.find_extremes(
-            grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places, rows[:, 1]
-        )
+            grid.values, grid.bounds, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, places,
+            rows[:, 1],
+        )  # fmt: skip
 
 
 def bound_extremes(grid: TrajectoryGrid) -> Array:
     """Bounds of what trajectories have had down to each state, whatever their base, (N, 6), as in :class:`Zeros`."""
     return kernel.bound_extremes(
-        grid.values, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
+        grid.values, grid.bounds, grid.overburden, grid.model.surface_stress, grid.states, grid.came_from, grid.first
     )
 
 

@@ -10,7 +10,7 @@ from numba import njit
 from numba.core import event
 
 #: Without fast-math, so that bits stay; a division by zero gives what numpy gives.
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _LOG = logging.getLogger(__name__)
 
 
@@ -20,10 +20,22 @@ def compiled(function: Callable[..., Any]) -> Any:
     What was compiled is kept beside the package, or where that cannot be written to among the user's cached files; and
     where neither can, it is compiled in each process.
     """
+    return _compiled(function, _OPTIONS)
+
+
+def compiled_in_place(function: Callable[..., Any]) -> Any:
+    """The same for a function that makes no arrays, but fills or reads those that it is given.
+
+    References to these are then not counted, which in short inner loops takes most of the time.
+    """
+    return _compiled(function, {**_OPTIONS, "_nrt": False})
+
+
+def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     try:
-        return njit(cache=True, **_OPTIONS)(function)
+        return njit(cache=True, **options)(function)
     except RuntimeError:
-        return njit(**_OPTIONS)(function)
+        return njit(**options)(function)
 
 
 class _Announcement(event.Listener):

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.compiled import compiled, compiled_in_place
+from chuteflow.numerics.tabulate import find_piece
 from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, OFFSET, SHEAR, UPPER, WALL_SHEAR, WORK
 
 #: Gauss points of an element.
@@ -28,7 +29,7 @@ _LONGEST, _HALVINGS = 2.0, 8
 _FALSE_POSITIONS = 60
 
 
-@compiled
+@compiled_in_place
 def closures(table: Any, x: float, f: Any) -> None:
     """The closures at x and their derivatives with respect to ln x, into ``f`` (16,).
 
@@ -38,15 +39,7 @@ def closures(table: Any, x: float, f: Any) -> None:
     degree, pieces, width = coefficients.shape
     inner = math.log1p(x / OFFSET)
     c = math.log1p(inner)
-    position = min(max(c, 0.0), UPPER) * (pieces / UPPER)
-    i = min(int(position), pieces - 1)
-    t = 2.0 * (position - i) - 1.0
-    if len(edges) > 0:
-        while position < edges[i]:
-            i -= 1
-        while position >= edges[i + 1] and i + 1 < pieces:
-            i += 1
-        t = 2.0 * (position - edges[i]) / (edges[i + 1] - edges[i]) - 1.0
+    i, t = find_piece(edges, pieces, min(max(c, 0.0), UPPER) * (pieces / UPPER))
     for q in range(width):
         f[q] = coefficients[degree - 1, i, q]
     for d in range(degree - 2, -1, -1):
@@ -57,13 +50,13 @@ def closures(table: Any, x: float, f: Any) -> None:
         f[q] *= by_log
 
 
-@compiled
+@compiled_in_place
 def density_argument(p: float, theta: float, beta: float) -> float:
     """x at the normal stress p > 0 and the potential theta."""
     return p * math.exp(-theta) if beta == 0.0 else math.exp((1.0 + beta) * math.log(p) - theta)
 
 
-@compiled
+@compiled_in_place
 def _solve_dense(matrix: Any, right: Any) -> bool:
     """Solve in place by Gauss elimination with row pivoting; the right sides are the rows' (n, r)."""
     n, r = right.shape
@@ -350,7 +343,7 @@ def _step(
     return True
 
 
-@compiled
+@compiled_in_place
 def _change_of_quantities(
     integrals: Any, breaks: Any, by_ends: Any, by_slopes: Any, ends: Any, slopes: Any, out: Any
 ) -> None:
@@ -547,7 +540,7 @@ def distribute(s: Any, theta: Any, y: Any, per_flux: float, longest: float) -> A
     return breaks
 
 
-@compiled
+@compiled_in_place
 def evaluate(breaks: Any, ends: Any, slopes: Any, cardinal: Any, s: Any, out: Any) -> None:
     """theta and y at places ``s`` (k,) ascending, into ``out`` (k, 2); ``cardinal`` (STAGES, STAGES) holds the
     integrals of the cardinal polynomials as coefficients of t, t^2, ..."""
@@ -640,7 +633,7 @@ def places(breaks: Any, points: Any) -> Any:
     return out
 
 
-@compiled
+@compiled_in_place
 def fit(breaks: Any, values: Any, differences: Any, ends: Any, slopes: Any) -> None:
     """The polynomials through ``values`` (N (STAGES + 1) + 1, 2) at :func:`places`; ``differences`` is the inverse of
     the integrals."""

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from chuteflow.numerics.complex_step import stepped
-from chuteflow.numerics.tabulate import Array, FunctionTable, antiderivative, tabulate
+from chuteflow.numerics.tabulate import Array, FunctionTable, PieceNodes, antiderivative, piece_nodes
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.theory import boundary
@@ -47,15 +47,13 @@ UPPER, _PIECES, _DEGREE = 4.2, 200, 7
 #: Closures differ by less than the second number from one side of a break to the other, at this distance in ln x, where
 #: they have no jump.
 _BESIDE, _JUMP = 1e-9, 1e-7
+#: After so small a step of Newton's method the next would be rounding.
+_QUADRATIC = 1e-7
 
 
-def _coordinate(x: Array) -> Array:
+def closure_coordinate(x: Array) -> Array:
+    """c, along which tables of closures run."""
     return np.log1p(np.log1p(x * (1.0 / OFFSET)))
-
-
-def _coordinate_slope(x: Array) -> Array:
-    """dc/dln x."""
-    return x / ((x + OFFSET) * (1.0 + np.log1p(x * (1.0 / OFFSET))))
 
 
 def _argument(c: Array) -> Array:
@@ -73,70 +71,82 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
     b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
     scaled_breaks = np.array([nu / (1.0 - nu / np.real(chosen.densest)) for nu in breaks])
-    density = _density_table(chosen, e, slope, b, _coordinate(scaled_breaks).tolist())
-    (log_ratio, _), _ = density(_coordinate(scaled_breaks))
-    breaks_of_x = _coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
-
-    def functions(c: Array) -> Array:
-        x = _argument(c)
-        ratio = _invert(density, x)  # of room-scaled density to x
-        scaled = x * np.exp(ratio)
-        r = reduce(chosen, scaled, e, slope)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
-        (_, gamma), _ = density(_coordinate(scaled))
-        k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
+    density = _density_table(chosen, e, slope, b, tuple(closure_coordinate(scaled_breaks).tolist()))
+    breaks_of_x = scaled_breaks
+    if len(breaks):
+        log_ratio = density.values(closure_coordinate(scaled_breaks))[0]
+        breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
+    nodes = _nodes(tuple(breaks_of_x.tolist()))
+    ratio = _invert(density, nodes.argument)  # of room-scaled density to x
+    scaled = nodes.argument * np.exp(ratio)
+    r = reduce(chosen, scaled, e, slope)
+    log_room = -np.log1p(scaled * (1.0 / chosen.densest))
+    k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
+    if np.all(b == 0.0):
+        gamma = density.values(closure_coordinate(scaled))[1]
+    else:
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
-        gamma = gamma if np.all(b == 0.0) else -(ratio + np.log(room) + np.log(r.compressibility))
-        return np.stack(
-            [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + np.log(room), gamma], axis=-1
-        )
+        gamma = -(ratio + log_room + np.log(r.compressibility))
+    values = [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + log_room, gamma]
+    return nodes.pieces.table(np.stack(values, axis=-1))
 
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks_of_x.tolist())
+
+@dataclass(frozen=True, eq=False)
+class _Nodes:
+    """The points of a table, and there the ``argument``, x or the scaled density, and its derivative with respect to
+    the coordinate; arrays (k,)."""
+
+    pieces: PieceNodes
+    argument: Array
+    by_coordinate: Array
+
+
+@lru_cache(maxsize=8)
+def _nodes(breaks: tuple[float, ...]) -> _Nodes:
+    pieces = piece_nodes(0.0, UPPER, _PIECES, _DEGREE, breaks)
+    argument = _argument(pieces.x)
+    return _Nodes(pieces, argument, (argument + OFFSET) * (1.0 + np.log1p(argument / OFFSET)))
 
 
 def evaluate_closures(table: FunctionTable, x: Array, side: Array | None = None) -> tuple[Array, Array]:
     """The eight functions of a ``table`` at x, and their derivatives with respect to ln x, each (8,) + x.shape; at a
     break those of the ``side`` on which that x lies, where it is given."""
     inner = np.log1p(x * (1.0 / OFFSET))
-    values, slopes = table(np.log1p(inner), None if side is None else _coordinate(side))
+    values, slopes = table(np.log1p(inner), None if side is None else closure_coordinate(side))
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: Sequence[float]) -> FunctionTable:
+def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: tuple[float, ...]) -> FunctionTable:
     """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
     ``breaks`` are places where the law is not smooth."""
-
-    def gamma_slope(c: Array) -> Array:
-        scaled = _argument(c)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
-        rate = reduce(chosen, scaled, e, slope).coupling * room**2  # dGamma/dscaled
-        return rate[:, None] * ((scaled + OFFSET) * (1.0 + np.log1p(scaled / OFFSET)))[:, None]
-
-    gamma = antiderivative(tabulate(gamma_slope, 0.0, UPPER, _PIECES, _DEGREE, breaks))
-
-    def functions(c: Array) -> Array:
-        scaled = _argument(c)
-        room = 1.0 / (1.0 + scaled / chosen.densest)
-        (big_gamma,), _ = gamma(c)
-        log_g = np.log(reduce(chosen, scaled, e, slope).compressibility)
-        if np.all(b == 0.0):
-            return np.stack([log_g + np.log(room) + big_gamma, big_gamma], axis=-1)
-        return np.stack([np.log(room) + (log_g + big_gamma) / (1.0 - b), big_gamma], axis=-1)
-
-    return tabulate(functions, 0.0, UPPER, _PIECES, _DEGREE, breaks)
+    nodes = _nodes(breaks)
+    r = reduce(chosen, nodes.argument, e, slope)
+    room = 1.0 / (1.0 + nodes.argument / chosen.densest)
+    rate = r.coupling * room**2  # dGamma/dscaled
+    gamma = antiderivative(nodes.pieces.table((rate * nodes.by_coordinate)[:, None]))
+    (big_gamma,) = gamma.values(nodes.pieces.x)
+    log_g, log_room = np.log(r.compressibility), np.log(room)
+    log_ratio = log_room + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
+    return nodes.pieces.table(np.stack([log_ratio, big_gamma], axis=-1))
 
 
 def _invert(density: FunctionTable, x: Array) -> Array:
     """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
     log_x = np.log(np.maximum(x, 1e-300))
     samples = _argument(np.linspace(1e-9, UPPER, 400))
-    (log_ratio, _), _ = density(_coordinate(samples))
+    log_ratio = density.values(closure_coordinate(samples))[0]
     log_scaled = np.interp(log_x, np.log(samples) + log_ratio.real, np.log(samples))
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
     for _ in range(3):
         scaled = np.exp(log_scaled)
-        values, slopes = density(_coordinate(scaled))
-        log_scaled = log_scaled - (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * _coordinate_slope(scaled))
+        inner = np.log1p(scaled * (1.0 / OFFSET))
+        values, slopes = density(np.log1p(inner))
+        by_log = scaled / ((scaled + OFFSET) * (1.0 + inner))  # derivative of the coordinate
+        step = (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * by_log)
+        log_scaled = log_scaled - step
+        # The imaginary part of a complex step is one iteration behind.
+        if np.isrealobj(step) and np.abs(step).max() < _QUADRATIC:
+            break
     return log_scaled - log_x
 
 
@@ -257,7 +267,7 @@ def model(chute: Chute) -> Model:
     return _registered(chute, chute.law)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _registered(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)

@@ -31,9 +31,8 @@ Indices = NDArray[np.intp]
 #: Rows of a state: ln p, ln X, y, the integral of P dz over p, that of P du over p^2, and that of dz.
 LOG_P, LOG_X, FLUX, MOMENT, SHEAR_FLUX, HEIGHT = range(6)
 ROWS = 6
-#: Densities at which the speed of a member's equations is looked up, and others at which the sign of net is.
+#: Densities at which the speed of a member's equations is looked up.
 _DENSITIES = np.append(0.0, np.logspace(-3.0, 4.0, 15))
-_SIGNS = np.append(0.0, np.logspace(-2.5, 4.0, 60))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +105,6 @@ class Batch:
         rate = np.sqrt(2.0 * np.abs(net) / conduction).max(axis=0)
         balance = np.sqrt(2.0 * np.maximum(net, 0.0) * conduction).max(axis=0)
         return rate, balance
-
-    def winding(self) -> NDArray[np.bool_]:
-        """Where loss and work balance at two densities (n,): deep trajectories then wind round the denser one, and
-        flows multiply with the hold-up, in windows of the surface temperature that no columns show."""
-        changes = np.zeros(len(self), dtype=np.intp)
-        positive = None
-        for x in _SIGNS.tolist():
-            _, net, _, _ = self.at_density(np.full(len(self), x))
-            changes += 0 if positive is None else (net > 0.0) != positive
-            positive = net > 0.0
-        return changes > 1
 
 
 _ZERO, _ONE = np.zeros(()), np.ones(())

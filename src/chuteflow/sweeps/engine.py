@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.enumeration import flows_within
+from chuteflow.branches.enumeration import solve_within
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
-from chuteflow.sweeps.at_quantity import solve_at_quantity
 from chuteflow.sweeps.bases import Flows, solve_at_temperature
 from chuteflow.sweeps.batch import Batch, Indices
 from chuteflow.sweeps.numbers import KINDS, ONE_BY_ONE, evaluate_quantities
@@ -28,8 +27,6 @@ from chuteflow.theory.bases import BASES
 from chuteflow.theory.constitutive import Law, require_positive
 
 _WHICH = {"Q": LOG_Q, "h": LOG_H, "M": LOG_M, "T_surface": LOG_T}
-#: Down to this hold-up columns are taken to lose no flows; the least at which they lost some is 4.79.
-_SHALLOW = 3.0
 #: Restitutions between which a law is taken to keep its meaning where it does at both.
 _RESTITUTIONS = 257
 #: What a calculation may end with that is no reason to stop the others.
@@ -39,8 +36,8 @@ _FAILURES = (ChuteflowError, ArithmeticError, ValueError, LookupError)
 @dataclass(frozen=True, eq=False)
 class Chunk:
     """The points of a chunk: ``parameters`` by name (n,), ``status``, ``reason`` and ``n_flows`` (n,), ``error`` and
-    the ``quantities`` (n, flows); ``failures`` says of the points that failed why. So many points were solved
-    one by one: ``winding`` since trajectories wind there, ``singly`` for other reasons."""
+    the ``quantities`` (n, flows); ``failures`` says of the points that failed why. ``singly`` is how many points were
+    solved one by one."""
 
     parameters: Mapping[str, Array]
     status: Flags
@@ -50,7 +47,6 @@ class Chunk:
     quantities: Mapping[str, NDArray[Any]]
     failures: Mapping[int, str]
     singly: int
-    winding: int
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
         """All arrays by the names that they have in a store."""
@@ -72,40 +68,28 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     valid = _valid(study, out.parameters, failures)
     out.status[~valid] = PointStatus.INVALID
     out.reason[~valid] = Reason.NO_ANSWER
-    # Members of a batch have the base of the paper.
-    other = _on_other_bases(study, out.parameters) & valid
-    singly, winding = int(other.sum()), 0
-    for point in np.flatnonzero(other).tolist():
+    batched = valid & _in_batches(study, out.parameters)
+    searched = valid & ~batched
+    for closure, surface, points in _groups(study, out.parameters, batched):
+        solved = _solved(study, _batch(closure, surface, out.parameters, points), out.parameters["T_surface"][points])
+        _fill(study, out, points, solved)
+        searched[points[solved.unsettled]] = True
+    for point in np.flatnonzero(searched).tolist():
         _fill_singly(study, out, point, failures)
-    out.reason[other & (out.n_flows == 0) & (out.status == PointStatus.COMPLETE)] = (
-        Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
-    )
-    valid &= ~other
-    for closure, surface, points in _groups(study, out.parameters, valid):
-        batch = _batch(closure, surface, out.parameters, points)
-        value = out.parameters[study.condition][points]
-        winds = _may_lose_flows(study, batch, value)
-        others = np.flatnonzero(~winds)
-        solved = _solved(study, batch.take(others), value[others])
-        _fill(study, out, points[others], solved)
-        for point in [*points[winds].tolist(), *points[others[solved.unsettled]].tolist()]:
-            _fill_singly(study, out, point, failures)
-        winding += int(winds.sum())
-        singly += int(solved.unsettled.sum())
-        _fill_reasons(out, batch, points)
+    _fill_reasons(study, out)
     found_failures = {first + i: why for i, why in sorted(failures.items())}
-    return replace(out, failures=found_failures, singly=singly, winding=winding)
+    return replace(out, failures=found_failures, singly=int(searched.sum()))
 
 
-def _may_lose_flows(study: Study, batch: Batch, value: Array) -> NDArray[np.bool_]:
-    """The members on which columns may lose deep flows with the condition's values (n,), since trajectories wind there.
-
-    Given surface temperatures are followed down one by one, so that no branch of flows has to be found; a given hold-up
-    need not be followed further.
-    """
-    if study.condition == "T_surface":
-        return np.zeros(len(batch), dtype=bool)
-    return batch.winding() & (value > _SHALLOW if study.condition == "M" else True)
+def _in_batches(study: Study, parameters: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Which points are integrated in batches: at given surface temperatures, where nothing has to be searched for, on
+    the base of the paper, with laws without breaks, at which integration in a batch would lose its order; and for
+    quantities that batches compute."""
+    asked = set(study.quantities)
+    if study.condition != "T_surface" or needs_stability(study.quantities) or not asked.isdisjoint(ONE_BY_ONE):
+        return np.zeros(len(parameters["closure"]), dtype=bool)
+    smooth = np.isin(parameters["closure"], [i for i, law in enumerate(study.laws) if law.smooth])
+    return smooth & ~_on_other_bases(study, parameters)
 
 
 def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
@@ -122,7 +106,6 @@ def _empty(study: Study, parameters: dict[str, Array], n: int) -> Chunk:
         },
         failures={},
         singly=0,
-        winding=0,
     )
 
 
@@ -196,26 +179,10 @@ class _Solved:
     unsettled: NDArray[np.bool_]
 
 
-def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
-    """Every flow of the batch at the condition's values (n,); none where they are to be solved one by one: where flows
-    need their stability or quantities that batches do not compute, or the law has breaks, at which
-    integration in a batch would lose its order."""
-    singly = needs_stability(study.quantities) or not set(ONE_BY_ONE).isdisjoint(study.quantities)
-    if not len(batch) or singly or not batch.law.smooth:
-        none = dict.fromkeys(study.quantities, np.empty(0))
-        return _Solved(Flows.joined([]), none, np.ones(len(batch), dtype=bool))
+def _solved(study: Study, batch: Batch, temperature: Array) -> _Solved:
+    """Every flow of the batch at the surface temperatures (n,)."""
     try:
-        if study.condition == "T_surface":
-            flows, unsettled = solve_at_temperature(batch, value, study.largest_holdup, study.tolerance)
-        else:
-            flows, unsettled = solve_at_quantity(
-                batch,
-                _WHICH[study.condition],
-                value,
-                study.surface_temperature,
-                study.largest_holdup,
-                study.tolerance,
-            )
+        flows, unsettled = solve_at_temperature(batch, temperature, study.largest_holdup, study.tolerance)
         return _sound(_Solved(flows, evaluate_quantities(study.quantities, batch, flows), unsettled))
     except _FAILURES:
         if len(batch) == 1:
@@ -223,7 +190,7 @@ def _solved(study: Study, batch: Batch, value: Array) -> _Solved:
     # One member must not keep the others from being solved: it is found by halves.
     half = len(batch) // 2
     members = np.arange(len(batch))
-    one, two = (_solved(study, batch.take(some), value[some]) for some in (members[:half], members[half:]))
+    one, two = (_solved(study, batch.take(some), temperature[some]) for some in (members[:half], members[half:]))
     return _Solved(
         Flows.joined([one.flows, replace(two.flows, member=two.flows.member + half)]),
         {name: np.concatenate([one.quantities[name], two.quantities[name]]) for name in study.quantities},
@@ -275,13 +242,8 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     # Of this chute nothing else is asked.
     within = SearchRange.checked(study.surface_temperature, study.largest_holdup, surface).restricted(which, value)
     try:
-        found = flows_within(
-            Chute(slope, e, ew, roughness, surface, closure, base),
-            which,
-            value,
-            study.tolerance,
-            within,
-        )
+        chute = Chute(slope, e, ew, roughness, surface, closure, base)
+        found = solve_within(chute, which, value, study.tolerance, within)
     except _FAILURES as error:
         out.status[point], out.reason[point] = PointStatus.FAILED, Reason.NO_ANSWER
         failures[point] = str(error) or type(error).__name__
@@ -302,7 +264,10 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
             values[point, k] = KINDS[name].index(value) if name in KINDS else value
 
 
-def _fill_reasons(out: Chunk, batch: Batch, points: Indices) -> None:
-    none = np.flatnonzero((out.n_flows[points] == 0) & (out.status[points] == PointStatus.COMPLETE))
-    if none.size:
-        out.reason[points[none]] = reasons(batch.take(none))
+def _fill_reasons(study: Study, out: Chunk) -> None:
+    """Why there is no flow: what is proved is known of the base of the paper."""
+    none = (out.n_flows == 0) & (out.status == PointStatus.COMPLETE)
+    others = _on_other_bases(study, out.parameters)
+    out.reason[none & others] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+    for closure, surface, points in _groups(study, out.parameters, none & ~others):
+        out.reason[points] = reasons(_batch(closure, surface, out.parameters, points))

@@ -20,7 +20,7 @@ def work(path: str, chunk: int) -> Marker:
         chunk=chunk,
         points=len(solved.status),
         flows=int(solved.n_flows.sum()),
-        singly=solved.singly + solved.winding,
+        singly=solved.singly,
         seconds=round(time.perf_counter() - begin, 3),
         failures=dict(solved.failures),
     )

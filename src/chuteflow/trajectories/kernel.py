@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.numerics.compiled import compiled
+from chuteflow.numerics.compiled import compiled, compiled_in_place
 from chuteflow.trajectories.tables import (
     BASE,
     BASE_ABOVE,
@@ -40,8 +40,13 @@ from chuteflow.trajectories.tables import (
     SPREAD,
 )
 
-#: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden.
-S_L, S_Y, S_T, S_H, S_G = range(5)
+#: Columns of a state: L, y, ln T_surface, the integrals of P dz and of P du over the overburden; and while it is
+#: advanced, what these two are integrals of.
+S_L, S_Y, S_T, S_H, S_G, S_DH, S_DG = range(7)
+#: Columns that are kept.
+_KEPT = 5
+#: Columns of the expansion in the layer at a free surface, see :func:`expand_in_layer`.
+Y_1, L_2, Y_3, H_1, H_3, G_1, G_3 = range(7)
 #: Kinds of invariant regions; in the first B > 0, in the others B < 0.
 FREE, HOT, LOW_FLUX, COLD, BEYOND = range(5)
 #: Below this L nothing changes with the density, and distances count less.
@@ -50,15 +55,19 @@ DILUTE, DILUTE_WEIGHT = -7.0, 0.1
 _COLDEST, _DENSEST = -8.0, 55.0
 #: Places between two states at which the residual is examined.
 _BETWEEN = 5
+#: Largest value of t (1 - t)^2 for t from 0 to 1.
+_HUMP = 4.0 / 27.0
+#: That times the largest r^2/(1 + r) for a ratio r of neighbouring lengths up to 2.
+_BEND = _HUMP * 4.0 / 3.0
+#: An overburden this many times smaller than one at which trajectories may meet the base is above all flows.
+_FAR = 2.0
 #: Trajectories inserted into one interval in one depth step at most.
 _MOST_INSERTED = 12
-#: The series at the surface of the half-line is used up to this fraction of T.
-START = 0.05
 #: Reasons why the curve ends.
 DONE, FULL = range(2)
 
 
-@compiled
+@compiled_in_place
 def interpolate_table(values: Any, big_l: float, column: int) -> float:
     """One function of the table, linear between entries."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -66,9 +75,9 @@ def interpolate_table(values: Any, big_l: float, column: int) -> float:
     return values[i, column] + (at - i) * (values[i + 1, column] - values[i, column])
 
 
-@compiled
-def _evaluate_derivative(values: Any, p: float, big_l: float, y: float) -> tuple[float, float]:
-    """dL/dp and dy/dp."""
+@compiled_in_place
+def _evaluate_derivative(values: Any, per_p: float, p: float, big_l: float, y: float) -> tuple[float, float]:
+    """dL/dp and dy/dp, where ``per_p`` is 1/p."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
     i = int(at)
     t = at - i
@@ -76,10 +85,11 @@ def _evaluate_derivative(values: Any, p: float, big_l: float, y: float) -> tuple
     k = values[i, COUPLED] + t * (values[i + 1, COUPLED] - values[i, COUPLED])
     net = values[i, NET] + t * (values[i + 1, NET] - values[i, NET])
     v = p * y * inverse - values[0, BETA]
-    return (1.0 - v) / p, net - y * (1.0 + 0.5 * (v + k * (1.0 - v))) / p
+    still = 1.0 - v
+    return still * per_p, net - y * (1.0 + 0.5 * (v + k * still)) * per_p
 
 
-@compiled
+@compiled_in_place
 def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -> tuple[float, float]:
     """P/nu and P du/dp, where ``shear`` is slope P sqrt(p)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -91,10 +101,10 @@ def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -
     return over * root * root * height, shear * root * shearing
 
 
-@compiled
+@compiled_in_place
 def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
-    """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau and slope P sqrt(p) at its ends and
-    middle into ``out`` (3, 3)."""
+    """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau, slope P sqrt(p), p and 1/p at its ends
+    and middle into ``out`` (3, 5)."""
     half_tau = 0.5 * (math.log(after / over) + (after - over) / p_1)
     target = math.log(over) + over / p_1 + half_tau
     # The overburden in the middle of the step, by Newton's method in ln P.
@@ -104,63 +114,161 @@ def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: floa
         log_middle -= (log_middle + middle / p_1 - target) / (1.0 + middle / p_1)
     out[0, 0], out[1, 0], out[2, 0] = over, math.exp(log_middle), after
     for c in range(3):
+        p = out[c, 0] + p_s
         out[c, 1] = out[c, 0] / (1.0 + out[c, 0] / p_1)
-        out[c, 2] = slope * out[c, 0] * math.sqrt(out[c, 0] + p_s)
+        out[c, 2] = slope * out[c, 0] * math.sqrt(p)
+        out[c, 3], out[c, 4] = p, 1.0 / p
     return half_tau
 
 
-@compiled
-def _advance(values: Any, p_s: float, half_tau: float, lengths: Any, curve: Any, j: int) -> None:
-    """One step of state ``j`` by the classical Runge-Kutta method in tau, for which :func:`_prepare_step` gives the
-    lengths; integrals by Simpson."""
-    p_0, p_m, p_1 = lengths[0, 0] + p_s, lengths[1, 0] + p_s, lengths[2, 0] + p_s
+@compiled_in_place
+def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, stopped: Any, slopes: Any) -> None:
+    """One step of the first ``n`` states but the ``stopped`` ones by the classical Runge-Kutta method in tau, for which
+    :func:`_prepare_step` gives the lengths; integrals by Simpson.
+
+    Stage by stage: the processor then works on several states at once. ``slopes`` (n, 6) is space for the stages.
+    """
+    p_0, p_m, p_1 = lengths[0, 3], lengths[1, 3], lengths[2, 3]
+    per_0, per_m, per_1 = lengths[0, 4], lengths[1, 4], lengths[2, 4]
     rate_0, rate_m, rate_1 = lengths[0, 1], lengths[1, 1], lengths[2, 1]
-    big_l, y = curve[j, S_L], curve[j, S_Y]
-    l_1, y_1 = _evaluate_derivative(values, p_0, big_l, y)
-    l_2, y_2 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_0 * l_1, y + half_tau * rate_0 * y_1)
-    l_3, y_3 = _evaluate_derivative(values, p_m, big_l + half_tau * rate_m * l_2, y + half_tau * rate_m * y_2)
-    l_m = big_l + half_tau * rate_m * l_3
-    l_4, y_4 = _evaluate_derivative(
-        values, p_1, big_l + 2.0 * half_tau * rate_m * l_3, y + 2.0 * half_tau * rate_m * y_3
-    )
-    third = half_tau / 3.0
-    curve[j, S_L] = big_l + third * (rate_0 * l_1 + 2.0 * rate_m * (l_2 + l_3) + rate_1 * l_4)
-    curve[j, S_Y] = y + third * (rate_0 * y_1 + 2.0 * rate_m * (y_2 + y_3) + rate_1 * y_4)
-    h_0, g_0 = _evaluate_integrands(values, lengths[0, 0], lengths[0, 2], big_l)
-    h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
-    h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], curve[j, S_L])
-    curve[j, S_H] += third * (h_0 * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
-    curve[j, S_G] += third * (g_0 * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+    step_0, step_m, third = half_tau * rate_0, half_tau * rate_m, half_tau / 3.0
+    for j in range(n):
+        slopes[j, 0], slopes[j, 1] = _evaluate_derivative(values, per_0, p_0, curve[j, S_L], curve[j, S_Y])
+    for j in range(n):
+        big_l, y = curve[j, S_L] + step_0 * slopes[j, 0], curve[j, S_Y] + step_0 * slopes[j, 1]
+        slopes[j, 2], slopes[j, 3] = _evaluate_derivative(values, per_m, p_m, big_l, y)
+    for j in range(n):
+        big_l, y = curve[j, S_L] + step_m * slopes[j, 2], curve[j, S_Y] + step_m * slopes[j, 3]
+        slopes[j, 4], slopes[j, 5] = _evaluate_derivative(values, per_m, p_m, big_l, y)
+    for j in range(n):
+        if stopped[j]:
+            continue
+        big_l, y, l_3, y_3 = curve[j, S_L], curve[j, S_Y], slopes[j, 4], slopes[j, 5]
+        l_m = big_l + step_m * l_3
+        l_4, y_4 = _evaluate_derivative(values, per_1, p_1, big_l + 2.0 * step_m * l_3, y + 2.0 * step_m * y_3)
+        big_l += third * (rate_0 * slopes[j, 0] + 2.0 * rate_m * (slopes[j, 2] + l_3) + rate_1 * l_4)
+        curve[j, S_L] = big_l
+        curve[j, S_Y] = y + third * (rate_0 * slopes[j, 1] + 2.0 * rate_m * (slopes[j, 3] + y_3) + rate_1 * y_4)
+        h_m, g_m = _evaluate_integrands(values, lengths[1, 0], lengths[1, 2], l_m)
+        h_1, g_1 = _evaluate_integrands(values, lengths[2, 0], lengths[2, 2], big_l)
+        curve[j, S_H] += third * (curve[j, S_DH] * rate_0 + 4.0 * h_m * rate_m + h_1 * rate_1)
+        curve[j, S_G] += third * (curve[j, S_DG] * rate_0 + 4.0 * g_m * rate_m + g_1 * rate_1)
+        curve[j, S_DH], curve[j, S_DG] = h_1, g_1
+
+
+@compiled_in_place
+def _follow(out: Any, before: Any, i: int, q: int, half: float, rate: float, source: float) -> None:
+    """Entry ``i`` of function ``q``, whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
+    with half a step of ``half``; in balance at the first. ``before`` (7,) is what the next entry needs of this."""
+    out[i, q] = source / rate if i == 0 else (before[q] + half * source) / (1.0 + half * rate)
+    before[q] = out[i, q] + half * (source - rate * out[i, q])
 
 
 @compiled
-def _start_at_surface(
-    values: Any, slope: float, p_s: float, y_s: float, theta_s: float, over: float, curve: Any, j: int
+def expand_in_layer(values: Any, low: Any, high: Any, log_scale: float, deepest: float) -> tuple[Any, float]:
+    """The expansion in small P of the states near a free surface, in the layer of overburdens up to ``deepest`` whose
+    coldest trajectory has the heat potential ``log_scale`` at the surface; and an overburden above which none of them
+    meets a base with a heat flux between ``low`` and ``high`` (entries,).
+
+    With lambda = (1 + beta) ln P - theta_surface, which is L but for terms in P^2,
+
+        L = lambda + P^2 L_2,    y = P (Y_1 + P^2 Y_3),
+        integral of P dz = P^2 exp(-lambda) (H_1 + P^2 H_3),    of P du = slope P^(5/2) exp(-lambda/2) (G_1 + P^2 G_3)
+
+    with functions of lambda alone (entries, 7), whose derivatives follow by comparing powers of P.
+    """
+    last = int(((1.0 + values[0, BETA]) * math.log(deepest) - log_scale - LOW) * PER_UNIT) + 2
+    last = min(max(last, 1), ENTRIES - 1)
+    out = np.empty((last + 1, 7))
+    return out, _expand(values, low, high, log_scale, deepest, out, np.zeros(7))
+
+
+@compiled_in_place
+def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, out: Any, before: Any) -> float:
+    """Fills ``out``, and gives the overburden above all flows; ``before`` (7,) is space."""
+    beta = values[0, BETA]
+    half = 0.5 / ((1.0 + beta) * PER_UNIT)
+    first = deepest
+    for i in range(len(out)):
+        after, ahead = max(i - 1, 0), min(i + 1, ENTRIES - 1)
+        per = PER_UNIT / (ahead - after)
+        net_slope = per * (values[ahead, NET] - values[after, NET])
+        k_slope = per * (values[ahead, COUPLED] - values[after, COUPLED])
+        height_slope = per * (values[ahead, HEIGHT] - values[after, HEIGHT])
+        shearing_slope = per * (values[ahead, SHEARING] - values[after, SHEARING])
+        inverse, k = values[i, INVERSE], values[i, COUPLED]
+        heating = 0.5 * (k * (1.0 + beta) - beta)
+        _follow(out, before, i, Y_1, half, 2.0 + heating, values[i, NET])
+        y = out[i, Y_1]
+        _follow(out, before, i, L_2, half, 2.0, -y * inverse)
+        moved = out[i, L_2]
+        heated = y * inverse * (1.0 - k) + (1.0 + beta) * moved * k_slope
+        _follow(out, before, i, Y_3, half, 4.0 + heating, moved * net_slope - 0.5 * y * heated)
+        _follow(out, before, i, H_1, half, 1.0 - beta, values[i, HEIGHT])
+        _follow(out, before, i, H_3, half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]))
+        _follow(out, before, i, G_1, half, 2.0 - 0.5 * beta, values[i, SHEARING])
+        _follow(out, before, i, G_3, half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]))
+        least, most = min(low[i], low[ahead]), max(high[i], high[ahead])
+        nearest = 0.0 if least <= 0.0 <= most else min(abs(least), abs(most))
+        reached = math.exp((LOW + i / PER_UNIT + log_scale) / (1.0 + beta))
+        first = min(first, max(nearest / (_FAR * max(abs(out[i, Y_1]), 1e-300)), reached / _FAR))
+    return first
+
+
+@compiled_in_place
+def _between(table: Any, i: int, t: float, column: int) -> float:
+    """One function at the place ``t`` from entry ``i`` to the next."""
+    return table[i, column] + t * (table[i + 1, column] - table[i, column])
+
+
+@compiled_in_place
+def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s: float, out: Any, j: int) -> None:
+    """State ``j`` in the layer at a free surface, by its expansion."""
+    big_l = (1.0 + values[0, BETA]) * math.log(over) - theta_s
+    at = min(max((big_l - LOW) * PER_UNIT, 0.0), len(layer) - 1.000001)
+    i = int(at)
+    t, square, root = at - i, over * over, math.exp(-0.5 * big_l)
+    out[j, S_L] = big_l + square * (_between(layer, i, t, L_2))
+    y_1, y_3 = _between(layer, i, t, Y_1), _between(layer, i, t, Y_3)
+    h_1, h_3 = _between(layer, i, t, H_1), _between(layer, i, t, H_3)
+    g_1, g_3 = _between(layer, i, t, G_1), _between(layer, i, t, G_3)
+    out[j, S_Y] = over * (y_1 + square * y_3)
+    out[j, S_H] = square * root * root * (h_1 + square * h_3)
+    out[j, S_G] = slope * square * math.sqrt(over) * root * (g_1 + square * g_3)
+    out[j, S_DH], out[j, S_DG] = _evaluate_integrands(values, over, slope * over * math.sqrt(over), out[j, S_L])
+
+
+@compiled_in_place
+def _start_all_in_layer(values: Any, layer: Any, slope: float, over: float, theta: Any, curve: Any, n: int) -> None:
+    for j in range(n):
+        _start_in_layer(values, layer, slope, over, theta[j], curve, j)
+
+
+@compiled
+def states_in_layer(values: Any, layer: Any, overburden: Any, theta_s: float) -> Any:
+    """L and y, (k, 2), at overburdens (k,) in the layer at a free surface, of one trajectory."""
+    states = np.empty((len(overburden), 7))
+    for j in range(len(overburden)):
+        _start_in_layer(values, layer, 0.0, overburden[j], theta_s, states, j)
+    return states[:, :2]
+
+
+@compiled_in_place
+def _start_all_at_interface(
+    values: Any, slope: float, p_s: float, y_s: float, theta: Any, over: float, curve: Any, n: int
 ) -> None:
-    """State ``j`` near the surface: on the half-line by the series (3.23)-(3.25), at the interface to first order."""
-    if p_s == 0.0:
-        beta = values[0, BETA]
-        half = values[0, NET] / (2.0 - 0.5 * beta)
-        big_l = (1.0 + beta) * math.log(over) - theta_s - 0.5 * over**2 * half * values[0, INVERSE]
-        v = over**2 * half * interpolate_table(values, big_l, INVERSE) - beta
-        net, k = interpolate_table(values, big_l, NET), interpolate_table(values, big_l, COUPLED)
-        share = 3.0 + 0.5 * beta
-        heating = v + k * (1.0 - v) + beta
-        curve[j, S_Y] = over * (half + (net - values[0, NET]) / share - 0.5 * half * heating / share)
-        fraction = 1.0 / (1.0 - beta)
-    else:
-        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta_s
-        l_p, y_p = _evaluate_derivative(values, p_s, big_l, y_s)
-        big_l += over * l_p
+    """The states a little below the interface, to first order."""
+    for j in range(n):
+        big_l = (1.0 + values[0, BETA]) * math.log(p_s) - theta[j]
+        l_p, y_p = _evaluate_derivative(values, 1.0 / p_s, p_s, big_l, y_s)
+        curve[j, S_L] = big_l + over * l_p
         curve[j, S_Y] = y_s + over * y_p
-        fraction = 0.5
-    curve[j, S_L] = big_l
-    h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), big_l)
-    curve[j, S_H] = fraction * h * over
-    curve[j, S_G] = 0.5 * g * over
+        h, g = _evaluate_integrands(values, over, slope * over * math.sqrt(over + p_s), curve[j, S_L])
+        curve[j, S_H], curve[j, S_G] = 0.5 * h * over, 0.5 * g * over
+        curve[j, S_DH], curve[j, S_DG] = h, g
 
 
-@compiled
+@compiled_in_place
 def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
     """The invariant region in which a state lies: from there on B keeps its sign (docs/theory/enumeration.md)."""
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001)
@@ -169,7 +277,7 @@ def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
         gained = max(bounds[i, NET_ABOVE], 0.0) - bounds[i, RELAX_ABOVE] * y / p
         return COLD if gained < bounds[i, CURVE_ABOVE] * y * y and y < bounds[i, BASE_ABOVE] else FREE
     net = bounds[i + 1, NET_LOW]
-    if net <= 0.0:
+    if net <= 0.0 or p * y <= bounds[i + 1, SPREAD]:
         return FREE
     bend, relax = max(bounds[i + 1, CURVE_HIGH], 1e-12), bounds[i + 1, RELAX_HIGH] / p
     least = min(y, 2.0 * net / (relax + math.sqrt(relax * relax + 4.0 * bend * net)))
@@ -184,7 +292,7 @@ def find_region(bounds: Any, p: float, big_l: float, y: float) -> int:
     return FREE
 
 
-@compiled
+@compiled_in_place
 def _find_region_or_limit(bounds: Any, p: float, curve: Any, j: int, limits: tuple[float, float, float]) -> int:
     """The region of a state; BEYOND where its flux by shear, which grows downwards, is larger than the first of what is
     ``limits``, and ln T_surface between the others."""
@@ -193,20 +301,20 @@ def _find_region_or_limit(bounds: Any, p: float, curve: Any, j: int, limits: tup
     return find_region(bounds, p, curve[j, S_L], curve[j, S_Y])
 
 
-@compiled
+@compiled_in_place
 def _scale_density(big_l: float) -> float:
     """L as distances count it."""
     return big_l if big_l > DILUTE else DILUTE + DILUTE_WEIGHT * (big_l - DILUTE)
 
 
-@compiled
+@compiled_in_place
 def _measure_distance(curve: Any, j: int, per_flux: float) -> float:
     """Of position j of the curve from the next."""
     apart = _scale_density(curve[j, S_L]) - _scale_density(curve[j + 1, S_L])
     return math.sqrt(apart * apart + ((curve[j, S_Y] - curve[j + 1, S_Y]) * per_flux) ** 2)
 
 
-@compiled
+@compiled_in_place
 def _limit_slope(before: float, after: float, d_before: float, d_after: float) -> float:
     """Slope at a point between two secants that keeps the interpolant monotonic (Fritsch & Butland 1984)."""
     one, two = before / d_before, after / d_after
@@ -216,7 +324,7 @@ def _limit_slope(before: float, after: float, d_before: float, d_after: float) -
     return (w_1 + w_2) / (w_1 / one + w_2 / two)
 
 
-@compiled
+@compiled_in_place
 def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, t: float, out: Any, k: int) -> None:
     """The state at ``t`` of the way from position j of the curve to the next, into ``out[k]``: a monotonic cubic."""
     d = length[j]
@@ -233,29 +341,51 @@ def _interpolate_state(curve: Any, j: int, n: int, connected: Any, length: Any, 
         )
 
 
-@compiled
-def _measure_bend(curve: Any, j: int, n: int, connected: Any, length: Any, q: int) -> tuple[float, float]:
-    """How much more quantity ``q`` changes by its slopes at position j of the curve, and at the next, than between
-    them: the slopes are those of parabolas through three positions."""
+@compiled_in_place
+def _is_far_from_zero(steepest: float, curve: Any, least: float, j: int, n: int, connected: Any, length: Any) -> bool:
+    """Whether along the cubic between position j of the curve and the next the residual certainly changes by less than
+    half of ``least``, its smaller size at the two; told from neighbours that are not much nearer."""
     d = length[j]
-    rise = curve[j + 1, q] - curve[j, q]
-    left = right = 0.0
+    most_y, most_l = abs(curve[j + 1, S_Y] - curve[j, S_Y]), abs(curve[j + 1, S_L] - curve[j, S_L])
+    most_y, most_l = (1.0 + 2.0 * _HUMP) * most_y, (1.0 + 2.0 * _HUMP) * most_l
     if j > 0 and connected[j - 1]:
-        left = ((curve[j, q] - curve[j - 1, q]) * d / length[j - 1] - rise) * d / (d + length[j - 1])
+        if length[j - 1] < 0.5 * d:
+            return False
+        most_y += _BEND * abs(curve[j, S_Y] - curve[j - 1, S_Y])
+        most_l += _BEND * abs(curve[j, S_L] - curve[j - 1, S_L])
     if j + 2 < n and connected[j + 1]:
-        right = ((curve[j + 2, q] - curve[j + 1, q]) * d / length[j + 1] - rise) * d / (d + length[j + 1])
-    return left, right
+        if length[j + 1] < 0.5 * d:
+            return False
+        most_y += _BEND * abs(curve[j + 2, S_Y] - curve[j + 1, S_Y])
+        most_l += _BEND * abs(curve[j + 2, S_L] - curve[j + 1, S_L])
+    return 2.0 * (most_y + steepest * most_l) <= least
 
 
-@compiled
-def _hides_zeros(values: Any, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any) -> bool:
+@compiled_in_place
+def _hides_zeros(
+    values: Any, steepest: float, curve: Any, residual: Any, j: int, n: int, connected: Any, length: Any
+) -> bool:
     """Whether the residual may have zeros more between position j of the curve and the next than its signs there show:
-    where it does along the cubic through the two states, or comes half of the way to it."""
+    where it does along the cubic through the two states, or comes half of the way to it. The slopes of the cubic are
+    those of parabolas through three positions; ``steepest`` is the largest slope of the flux of the base."""
     before, last = residual[j], residual[j + 1]
     least = min(abs(before), abs(last))
+    alike = (before >= 0.0) == (last >= 0.0)
+    if alike and _is_far_from_zero(steepest, curve, least, j, n, connected, length):
+        return False
     rise_l, rise_y = curve[j + 1, S_L] - curve[j, S_L], curve[j + 1, S_Y] - curve[j, S_Y]
-    left_l, right_l = _measure_bend(curve, j, n, connected, length, S_L)
-    left_y, right_y = _measure_bend(curve, j, n, connected, length, S_Y)
+    # How much more L and y change by their slopes at the one and the other end than between them.
+    left_l = left_y = right_l = right_y = 0.0
+    if j > 0 and connected[j - 1]:
+        ratio = length[j] / length[j - 1]
+        weight = ratio / (1.0 + ratio)
+        left_l = ((curve[j, S_L] - curve[j - 1, S_L]) * ratio - rise_l) * weight
+        left_y = ((curve[j, S_Y] - curve[j - 1, S_Y]) * ratio - rise_y) * weight
+    if j + 2 < n and connected[j + 1]:
+        ratio = length[j] / length[j + 1]
+        weight = ratio / (1.0 + ratio)
+        right_l = ((curve[j + 2, S_L] - curve[j + 1, S_L]) * ratio - rise_l) * weight
+        right_y = ((curve[j + 2, S_Y] - curve[j + 1, S_Y]) * ratio - rise_y) * weight
     changes = 0
     nearest = least
     for c in range(1, _BETWEEN + 1):
@@ -267,7 +397,7 @@ def _hides_zeros(values: Any, curve: Any, residual: Any, j: int, n: int, connect
         nearest = min(nearest, abs(here))
         before = here
     changes += int((last >= 0.0) != (before >= 0.0))
-    if (residual[j] >= 0.0) == (last >= 0.0):
+    if alike:
         return changes > 0 or nearest < 0.5 * least
     return changes > 1
 
@@ -283,7 +413,7 @@ def _grow(array: Any, size: int) -> Any:
     return out
 
 
-@compiled
+@compiled_in_place
 def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
     """Join the ``count`` zeros, two or more, on the boundary of a cell, in cyclic order, in pairs: of the two ways to
     join neighbours the one with the shorter lines."""
@@ -302,6 +432,145 @@ def _pair_zeros(nodes: Any, places: Any, count: int, links: Any) -> None:
         links[two, 0 if links[two, 0] < 0 else 1] = one
 
 
+# What follows works on the positions of the curve: of the first n of the arrays, ``theta`` is the heat potential at the
+# surface, ``stopped`` whether a state is no longer advanced, ``connected`` whether the curve continues to the next,
+# ``came`` the place among the states of the step before, ``region`` the invariant region, ``residual`` B, and
+# ``length`` the distance from the next.
+
+
+@compiled_in_place
+def _stop(curve: Any, n: int, stopped: Any, coldest: float) -> None:
+    """Stop the states that are too cold or too dense to be advanced."""
+    for j in range(n):
+        if not stopped[j] and (not (curve[j, S_Y] > coldest) or curve[j, S_L] > _DENSEST):
+            curve[j, S_Y] = coldest
+            curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
+            if not math.isfinite(curve[j, S_H]):
+                curve[j, S_H] = 1e300
+            if not math.isfinite(curve[j, S_G]):
+                curve[j, S_G] = 1e300
+            stopped[j] = True
+
+
+@compiled_in_place
+def _examine(
+    values: Any, bounds: Any, p: float, per_flux: float, limits: tuple[float, float, float],
+    curve: Any, n: int, stopped: Any, region: Any, residual: Any, length: Any,
+) -> None:  # fmt: skip
+    """Regions, residuals and lengths."""
+    for j in range(n):
+        region[j] = COLD if stopped[j] else _find_region_or_limit(bounds, p, curve, j, limits)
+        residual[j] = curve[j, S_Y] - interpolate_table(values, curve[j, S_L], BASE)
+    for j in range(n - 1):
+        length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
+
+
+@compiled_in_place
+def _plan_insertions(
+    values: Any, steepest: float, delta: float, finest: float,
+    curve: Any, n: int, connected: Any, region: Any, residual: Any, length: Any, n_inserted: Any, limited: Any,
+) -> tuple[int, int, int]:  # fmt: skip
+    """How many states to insert after each position, and whether that is not enough, so that the cell is undecided; in
+    all how many to insert, cells examined, and undecided."""
+    extra = cells = undecided = 0
+    for j in range(n):
+        n_inserted[j], limited[j] = 0, False
+        if j + 1 == n or not connected[j] or (region[j] != FREE and region[j] == region[j + 1]):
+            continue
+        cells += 1
+        if length[j] > delta:
+            n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
+            limited[j] = length[j] > 2.0 * delta * (n_inserted[j] + 1)
+        elif _hides_zeros(values, steepest, curve, residual, j, n, connected, length):
+            n_inserted[j] = 1 if length[j] > finest else 0
+            limited[j] = length[j] <= finest
+        undecided += int(limited[j])
+        extra += n_inserted[j]
+    return extra, cells, undecided
+
+
+@compiled_in_place
+def _interpolate_planned(curve: Any, n: int, connected: Any, length: Any, n_inserted: Any, inserted: Any) -> None:
+    """The states to insert, in order."""
+    k = 0
+    for j in range(n):
+        for c in range(n_inserted[j]):
+            _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
+            k += 1
+
+
+@compiled_in_place
+def _insert(
+    bounds: Any, p: float, limits: tuple[float, float, float], n_inserted: Any, inserted: Any, extra: int,
+    curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
+) -> None:  # fmt: skip
+    """Insert the ``extra`` states; from the end of the curve, so that nothing is overwritten before it is moved."""
+    at, k = n + extra, extra
+    ahead = at  # where the position after the present one is now
+    for j in range(n - 1, -1, -1):
+        for c in range(n_inserted[j] - 1, -1, -1):
+            at -= 1
+            k -= 1
+            t = (c + 1.0) / (n_inserted[j] + 1.0)
+            for q in range(7):
+                curve[at, q] = inserted[k, q]
+            theta[at] = theta[j] + t * (theta[ahead] - theta[j])
+            came[at] = came[j] + t * (came[ahead] - came[j])
+            stopped[at] = False
+            connected[at] = True
+            region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
+        at -= 1
+        if at == j:
+            break  # nothing is inserted before
+        ahead = at
+        for q in range(7):
+            curve[at, q] = curve[j, q]
+        theta[at], came[at], stopped[at], connected[at], region[at] = (
+            theta[j],
+            came[j],
+            stopped[j],
+            connected[j],
+            region[j],
+        )
+
+
+@compiled_in_place
+def _record(
+    states: Any, came_from: Any, goes_on: Any, total: int,
+    curve: Any, n: int, theta: Any, stopped: Any, connected: Any, region: Any, came: Any,
+) -> int:  # fmt: skip
+    """Keep the states, after ``total`` others. Then close the curve where both ends of an interval lie in one invariant
+    region, and drop what is closed in; how many positions are left."""
+    at = 0
+    joined = False  # to the position before
+    for j in range(n):
+        for q in range(_KEPT):
+            states[total + j, q] = curve[j, q]
+        came_from[total + j], goes_on[total + j] = came[j], connected[j]
+        ahead = j + 1 < n and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
+        if joined or ahead:
+            if at < j:
+                for q in range(7):
+                    curve[at, q] = curve[j, q]
+                theta[at], stopped[at] = theta[j], stopped[j]
+            connected[at] = ahead
+            came[at] = total + j
+            at += 1
+        joined = ahead
+    return at
+
+
+@compiled_in_place
+def _note_undecided(limited: Any, n_inserted: Any, n: int, total: int, undecided: Any, n_undecided: int) -> None:
+    """The first states of the cells that are undecided, by their place among all states after ``total`` others."""
+    at = total
+    for j in range(n):
+        if limited[j]:
+            undecided[n_undecided] = at
+            n_undecided += 1
+        at += 1 + n_inserted[j]
+
+
 @compiled
 def integrate(
     values: Any,
@@ -310,7 +579,9 @@ def integrate(
     p_s: float,
     y_s: float,
     p_1: float,
-    start_at_most: float,
+    layer: Any,
+    layer_depth: float,
+    steepest: float,
     overburden: Any,
     log_t: Any,
     theta_s: Any,
@@ -321,7 +592,9 @@ def integrate(
     largest_flux: float,
 ) -> tuple[Any, ...]:
     """Integrate the curve of states down the depth steps ``overburden`` (R,) from surface temperatures ``log_t`` (C,)
-    ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``.
+    ascending, and no further than to where the flux by shear alone is larger than ``largest_flux``. Down to
+    ``layer_depth`` the states are those of the expansion ``layer``; ``steepest`` is the largest slope of the heat flux
+    of the base over L.
 
     Returns the states of all depth steps (N, 5), the place in the step before from which each came (N,), between two
     states where it was inserted, whether the curve continues from each to the next (N,), the first position of each
@@ -329,7 +602,7 @@ def integrate(
     the curve ended.
     """
     n = len(log_t)
-    states = np.empty((64 * n + 1024, 5))
+    states = np.empty((64 * n + 1024, _KEPT))
     came_from = np.empty(len(states))
     goes_on = np.empty(len(states), np.bool_)
     first = np.zeros(len(overburden) + 1, np.int64)
@@ -337,22 +610,11 @@ def integrate(
     n_undecided = total = cells = 0
     status = DONE
 
-    # The curve: n positions in use of these.
-    curve = np.empty((4 * n, 5))
-    theta = np.empty(len(curve))  # heat potential at the surface
-    in_series = np.zeros(len(curve), np.bool_)
-    stopped = np.zeros(len(curve), np.bool_)  # no longer advanced
-    connected = np.ones(len(curve), np.bool_)  # whether the curve continues to the next position
-    region = np.empty(len(curve), np.int64)
-    residual = np.empty(len(curve))
-    length = np.empty(len(curve))  # distance from the next position
-    # The same positions in the step before: place among the states, and where they are now, since some are inserted
-    # between.
-    previous = np.full(len(curve), -1, np.int64)
-    shifted = np.empty(len(curve), np.int64)
-    n_inserted = np.empty(len(curve), np.int64)  # how many to insert after a position
-    inserted = np.empty((len(curve), 5))
-    lengths = np.empty((3, 3))
+    curve, inserted, slopes = np.empty((4 * n, 7)), np.empty((4 * n, 7)), np.empty((4 * n, 6))
+    theta, came, residual, length = np.empty(4 * n), np.full(4 * n, -1.0), np.empty(4 * n), np.empty(4 * n)
+    stopped, connected, limited = np.zeros(4 * n, np.bool_), np.ones(4 * n, np.bool_), np.zeros(4 * n, np.bool_)
+    region, n_inserted = np.empty(4 * n, np.int64), np.empty(4 * n, np.int64)
+    lengths = np.empty((3, 5))
     theta[:n] = theta_s
     curve[:n, S_T] = log_t
     # The outermost trajectories tell where branches lead out of the range.
@@ -361,125 +623,48 @@ def integrate(
     for step in range(len(overburden)):
         over = overburden[step]
         p = over + p_s
-        # Advance.
-        half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths) if step > 0 else 0.0
-        for j in range(n):
-            if step == 0 or in_series[j]:
-                log_scale = theta[j] / (1.0 + values[0, BETA])
-                in_series[j] = p_s == 0.0 and (step == 0 or over <= min(START * math.exp(log_scale), start_at_most))
-                if step == 0 or in_series[j]:
-                    _start_at_surface(values, slope, p_s, y_s, theta[j], over, curve, j)
-                    continue
-            if not stopped[j]:
-                _advance(values, p_s, half_tau, lengths, curve, j)
-                if not (curve[j, S_Y] > _COLDEST / per_flux) or curve[j, S_L] > _DENSEST:
-                    curve[j, S_Y] = _COLDEST / per_flux
-                    curve[j, S_L] = min(max(curve[j, S_L], LOW), _DENSEST)
-                    if not math.isfinite(curve[j, S_H]):
-                        curve[j, S_H] = 1e300
-                    if not math.isfinite(curve[j, S_G]):
-                        curve[j, S_G] = 1e300
-                    stopped[j] = True
-        # Where to insert; a cell is undecided where that is not enough.
-        for j in range(n):
-            region[j] = COLD if stopped[j] else _find_region_or_limit(bounds, p, curve, j, limits)
-            residual[j] = curve[j, S_Y] - interpolate_table(values, curve[j, S_L], BASE)
-        for j in range(n - 1):
-            length[j] = max(_measure_distance(curve, j, per_flux), 1e-14)
-        extra = 0
-        for j in range(n):
-            n_inserted[j] = 0
-            if j + 1 == n or not connected[j] or (region[j] != FREE and region[j] == region[j + 1]):
-                continue
-            cells += 1
-            limited = False
-            if length[j] > delta:
-                n_inserted[j] = min(int(length[j] / delta), _MOST_INSERTED)
-                limited = length[j] > 2.0 * delta * (n_inserted[j] + 1)
-            elif not in_series[j]:
-                doubtful = _hides_zeros(values, curve, residual, j, n, connected, length)
-                n_inserted[j] = 1 if doubtful and length[j] > finest else 0
-                limited = doubtful and length[j] <= finest
-            if limited:
-                undecided = _grow(undecided, n_undecided + 1)
-                undecided[n_undecided] = j + extra + total
-                n_undecided += 1
-            extra += n_inserted[j]
-        if total + n + extra > most:
+        if p_s == 0.0 and (step == 0 or over <= layer_depth):
+            _start_all_in_layer(values, layer, slope, over, theta, curve, n)
+        elif step == 0:
+            _start_all_at_interface(values, slope, p_s, y_s, theta, over, curve, n)
+        else:
+            half_tau = _prepare_step(slope, p_s, p_1, overburden[step - 1], over, lengths)
+            _advance(values, half_tau, lengths, curve, n, stopped, slopes)
+            _stop(curve, n, stopped, _COLDEST / per_flux)
+        _examine(values, bounds, p, per_flux, limits, curve, n, stopped, region, residual, length)
+        extra, examined, new = _plan_insertions(
+            values, steepest, delta, finest, curve, n, connected, region, residual, length, n_inserted, limited
+        )
+        cells += examined
+        if new > 0:
+            undecided = _grow(undecided, n_undecided + new)
+            _note_undecided(limited, n_inserted, n, total, undecided, n_undecided)
+            n_undecided += new
+        m = n + extra
+        if total + m > most:
             status = FULL
             first[step + 1 :] = total
             break
-        m = n + extra
-        states = _grow(states, total + m)
-        came_from = _grow(came_from, total + m)
-        goes_on = _grow(goes_on, total + m)
-        for j in range(n):
-            shifted[j] = j
+        if total + m > len(states):
+            states, came_from, goes_on = (
+                _grow(states, total + m),
+                _grow(came_from, total + m),
+                _grow(goes_on, total + m),
+            )
+        if m > len(curve):
+            curve, slopes, theta, came = _grow(curve, m), _grow(slopes, m), _grow(theta, m), _grow(came, m)
+            residual, length, region = _grow(residual, m), _grow(length, m), _grow(region, m)
+            stopped, connected, limited = _grow(stopped, m), _grow(connected, m), _grow(limited, m)
+            n_inserted = _grow(n_inserted, m)
         if extra > 0:
             inserted = _grow(inserted, extra)
-            k = 0
-            for j in range(n):
-                for c in range(n_inserted[j]):
-                    _interpolate_state(curve, j, n, connected, length, (c + 1.0) / (n_inserted[j] + 1.0), inserted, k)
-                    k += 1
-            if m > len(curve):
-                curve, theta, in_series, stopped = (
-                    _grow(curve, m),
-                    _grow(theta, m),
-                    _grow(in_series, m),
-                    _grow(stopped, m),
-                )
-                connected, region, residual, length = (
-                    _grow(connected, m),
-                    _grow(region, m),
-                    _grow(residual, m),
-                    _grow(length, m),
-                )
-                previous, shifted, n_inserted = _grow(previous, m), _grow(shifted, m), _grow(n_inserted, m)
-            # From the end of the curve, so that nothing is overwritten before it is shifted.
-            at = m
-            for j in range(n - 1, -1, -1):
-                for c in range(n_inserted[j] - 1, -1, -1):
-                    at -= 1
-                    k -= 1
-                    t = (c + 1.0) / (n_inserted[j] + 1.0)
-                    for q in range(5):
-                        curve[at, q] = inserted[k, q]
-                    theta[at] = theta[j] + t * (theta[shifted[j + 1]] - theta[j])
-                    in_series[at] = in_series[j] and in_series[shifted[j + 1]]
-                    stopped[at] = False
-                    connected[at] = True
-                    region[at] = _find_region_or_limit(bounds, p, inserted, k, limits)
-                    residual[at] = inserted[k, S_Y] - interpolate_table(values, inserted[k, S_L], BASE)
-                    came_from[total + at] = previous[j] + t * (previous[j + 1] - previous[j])
-                at -= 1
-                shifted[j] = at
-                for q in range(5):
-                    curve[at, q] = curve[j, q]
-                theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
-                connected[at], region[at], residual[at] = connected[j], region[j], residual[j]
-        for j in range(n):
-            came_from[total + shifted[j]] = previous[j]
-        for j in range(m):
-            for q in range(5):
-                states[total + j, q] = curve[j, q]
-            goes_on[total + j] = connected[j]
+            _interpolate_planned(curve, n, connected, length, n_inserted, inserted)
+            _insert(
+                bounds, p, limits, n_inserted, inserted, extra,
+                curve, n, theta, stopped, connected, region, came,
+            )  # fmt: skip
         first[step] = total
-        # Close the curve where both ends of an interval lie in one invariant region, and drop what is closed in.
-        at = 0
-        joined = False  # to the position before
-        for j in range(m):
-            ahead = j + 1 < m and connected[j] and not (region[j] != FREE and region[j] == region[j + 1])
-            if joined or ahead:
-                if at < j:
-                    for q in range(5):
-                        curve[at, q] = curve[j, q]
-                    theta[at], in_series[at], stopped[at] = theta[j], in_series[j], stopped[j]
-                connected[at] = ahead
-                previous[at] = total + j
-                at += 1
-            joined = ahead
-        n = at
+        n = _record(states, came_from, goes_on, total, curve, m, theta, stopped, connected, region, came)
         total += m
         first[step + 1] = total
         if n == 0:
@@ -622,8 +807,21 @@ def trace_back(states: Any, came_from: Any, place: float, step: int) -> Any:
     return out
 
 
+@compiled_in_place
+def _passed_above(values: Any, bounds: Any, p_s: float, big_l: float) -> tuple[float, float]:
+    """The least and the largest net loss on a trajectory above where the curve starts with L on it: below a free
+    surface L rises to there, and at an interface it starts there."""
+    net = interpolate_table(values, big_l, NET)
+    if p_s > 0.0:
+        return net, net
+    i = int(min(max((big_l - LOW) * PER_UNIT, 0.0), ENTRIES - 1.000001))
+    return min(net, bounds[i, NET_LOW]), max(net, bounds[i, NET_HIGH])
+
+
 @compiled
-def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any) -> Any:
+def bound_extremes(
+    values: Any, bounds: Any, overburden: Any, p_s: float, states: Any, came_from: Any, first: Any
+) -> Any:
     """Bounds of the least and the largest net loss, and of the largest 1 - p dL/dp, of each trajectory down to each
     state: lower ones in the first three columns, upper ones in the others (N, 6). Above where it was inserted a
     trajectory lies between its neighbours, and its extrema between theirs."""
@@ -635,7 +833,11 @@ def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_f
             turn = p * states[i, S_Y] * interpolate_table(values, states[i, S_L], INVERSE) - values[0, BETA]
             out[i, 0] = out[i, 1] = out[i, 3] = out[i, 4] = net
             out[i, 2] = out[i, 5] = turn
-            if step > 0:
+            if step == 0:
+                low_net, high_net = _passed_above(values, bounds, p_s, states[i, S_L])
+                out[i, 0] = out[i, 3] = low_net
+                out[i, 1] = out[i, 4] = high_net
+            else:
                 one = int(came_from[i])
                 other = one + 1 if came_from[i] > one else one
                 for low in (0, 3):
@@ -647,13 +849,14 @@ def bound_extremes(values: Any, overburden: Any, p_s: float, states: Any, came_f
 
 @compiled
 def find_extremes(
-    values: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, steps: Any
+    values: Any, bounds: Any, overburden: Any, p_s: float, states: Any, came_from: Any, places: Any, steps: Any
 ) -> Any:
     """The least and the largest net loss, and the largest 1 - p dL/dp, down to ``places`` (k,) in ``steps``, (k, 3)."""
     out = np.empty((len(places), 3))
     for k in range(len(places)):
         back = trace_back(states, came_from, places[k], steps[k])
-        out[k, 0], out[k, 1], out[k, 2] = np.inf, -np.inf, -np.inf
+        out[k, 0], out[k, 1] = _passed_above(values, bounds, p_s, back[0, 0])
+        out[k, 2] = -np.inf
         for step in range(steps[k] + 1):
             net = interpolate_table(values, back[step, 0], NET)
             p = overburden[step] + p_s

@@ -24,9 +24,9 @@ from chuteflow.steady.elements import Elements
 from chuteflow.steady.model import GAMMA, Model
 from chuteflow.steady.solver import default_stretch
 from chuteflow.trajectories import kernel
-from chuteflow.trajectories.kernel import S_G, S_H, S_L, S_T, START
+from chuteflow.trajectories.kernel import S_G, S_H, S_L, S_T
 from chuteflow.trajectories.surface import surface_potential
-from chuteflow.trajectories.tables import BASE, ENTRIES, Tables, base_table, bounds_for, tables
+from chuteflow.trajectories.tables import BASE, ENTRIES, base_table, bounds_for, tables
 
 Index = NDArray[np.int64]
 
@@ -57,9 +57,11 @@ class Refinement:
 
 #: The refinement of every search by default.
 REFINEMENT = Refinement()
-#: Depths close to the surface of the half-line: how many, and their step in ln P. At the interface: the least
-#: overburden.
-_THIN, _THIN_STEP, _LEAST = 40, 0.5, 5e-10
+#: The least overburden: of all, and at the interface.
+_LEAST, _LEAST_AT_INTERFACE = 1e-14, 5e-10
+#: The layer below a free surface in which the states are expanded in P reaches to this fraction of the shortest length
+#: of the equations. Above it a rough flow is known at overburdens from this fraction of T, at this step in ln P.
+_LAYER, _SURFACE, _SURFACE_STEP = 0.2, 0.05, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +89,10 @@ class TrajectoryGrid:
     ``states`` (N, 5) hold L, y, ln T_surface and the integrals of P dz and P du, one depth step after the other in the
     order of the curve; ``first`` (R + 1,) are the first of each step; ``came_from`` (N,) the place of the same
     trajectory in the step before, between two states where it was inserted; ``goes_on`` (N,) is whether the curve
-    goes on to the next state. ``values`` (entries, 7) are the functions of L in their equations, and ``scale`` the size
-    of heat fluxes. They hold for every base between those for which parts were kept: :meth:`of_base` has the zeros of
-    another. ``zeros`` (Z, 3) are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2)
+    goes on to the next state. ``values`` (entries, 7) are the functions of L in their equations, ``bounds`` (entries,
+    12) their extrema, ``layer`` (entries, 7) the expansion near a free surface, and ``scale`` the size of heat fluxes.
+    They hold for every base between those for which parts were kept: :meth:`of_base` has the zeros of another.
+    ``zeros`` (Z, 3) are the two states between which B vanishes, and the fraction of the way; ``links`` (Z, 2)
     are their neighbours along the branches. Of the ``cells`` between neighbours that were examined, ``undecided`` (U,)
     are the first states of those that may hide zeros: they are shorter than ``finest`` and B turns towards zero in
     them, or they are too long. ``complete`` is whether the curve was integrated to the last depth.
@@ -103,6 +106,8 @@ class TrajectoryGrid:
     goes_on: NDArray[np.bool_]
     first: Index
     values: Array
+    bounds: Array
+    layer: Array
     scale: float
     zeros: Array
     links: Index
@@ -173,11 +178,15 @@ class TrajectoryGrid:
         log_mass, log_t = self.macroscopic[zero, 2:]
         mass, temperature = float(np.exp(log_mass)), float(np.exp(log_t))
         over = self.overburden[: len(back)]
+        surface = float(surface_potential(model, np.array([temperature]))[0])
+        if model.surface_stress == 0.0:
+            above = _above(float(over[0]), temperature ** (1.0 / (1.0 + model.beta)))
+            back = np.concatenate([kernel.states_in_layer(self.values, self.layer, above, surface), back])
+            over = np.concatenate([above, over])
         theta = (1.0 + model.beta) * np.log(over + model.surface_stress) - back[:, 0]
         per_mass = (back[:, 1] - model.surface_flux) / over
         log_over = np.log(over)
         stretch = default_stretch(model, mass, temperature)
-        surface = float(surface_potential(model, np.array([temperature]))[0])
 
         def values(s: Array) -> Array:
             m, _ = stretch_map(s, stretch)
@@ -188,6 +197,12 @@ class TrajectoryGrid:
         s = np.clip(stretch_position(over / mass, stretch), 0.0, 1.0)
         inside = s < 1.0
         return Elements.sample(model, stretch, float(log_mass), np.concatenate([[0.0], s[inside], [1.0]]), values)
+
+
+def _above(first: float, temperature: float) -> Array:
+    """Overburdens above the first, down to which nothing happens but the change of density in the surface layer."""
+    many = int(np.ceil(np.log(max(first / (_SURFACE * temperature), 1.0)) / _SURFACE_STEP))
+    return first * np.exp(-_SURFACE_STEP * np.arange(many, 0, -1))
 
 
 @lru_cache(maxsize=4)
@@ -224,43 +239,43 @@ def integrate_trajectories_from(
     serves the base of ``model``, ``others`` (entries, K) by their heat fluxes, and all between these; its zeros are of
     the first. Trajectories are followed to where their flux by shear is above ``largest_flux``."""
     t = tables(model)
-    bounds, scale = t.bounds, t.scale
+    bounds, scale, steepest = t.bounds, t.scale, t.steepest
+    fluxes = np.concatenate([t.values[:, BASE, None], others], axis=1)
     if others.shape[1]:
-        bounds = bounds_for(model, np.concatenate([t.values[:, BASE, None], others], axis=1))
+        bounds = bounds_for(model, fluxes)
         scale = max(scale, float(np.abs(others).max()))
+    theta = surface_potential(model, temperature)
+    first, layer_depth, layer = _LEAST_AT_INTERFACE, 0.0, np.empty((0, 7))
+    if model.surface_stress == 0.0:
+        layer_depth = min(_LAYER / max(t.rate, 1.0), 0.5 * deepest)
+        layer, nearest = kernel.expand_in_layer(
+            t.values, fluxes.min(axis=1), fluxes.max(axis=1), float(theta[0]), layer_depth
+        )
+        first = min(max(nearest, _LEAST), layer_depth)
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
-    coldest = float(temperature[0]) ** (1.0 / (1.0 + model.beta))
-    overburden = _depths(model, t, coldest, deepest, p_1, refinement.step)
-    states, came_from, goes_on, first, undecided, cells, status = kernel.integrate(
+    overburden = _depths(first, deepest, p_1, refinement.step)
+    states, came_from, goes_on, places, undecided, cells, status = kernel.integrate(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
-        _start_at_most(t), overburden, np.log(temperature), surface_potential(model, temperature),
+        layer, layer_depth, steepest, overburden, np.log(temperature), theta,
         refinement.delta, 1.0 / scale, refinement.finest, refinement.most, largest_flux,
     )  # fmt: skip
-    zeros, links = kernel.find_zeros(t.values, BASE, states, came_from, goes_on, first)
+    zeros, links = kernel.find_zeros(t.values, BASE, states, came_from, goes_on, places)
     return TrajectoryGrid(
-        model, refinement, overburden, states, came_from, goes_on, first, t.values, scale, zeros, links, cells,
-        undecided, status == kernel.DONE,
+        model, refinement, overburden, states, came_from, goes_on, places, t.values, bounds, layer, scale, zeros,
+        links, cells, undecided, status == kernel.DONE,
     )  # fmt: skip
 
 
-def _start_at_most(t: Tables) -> float:
-    return START / max(t.rate, 1.0)
-
-
-def _depths(model: Model, t: Tables, coldest: float, deepest: float, p_1: float, step: float) -> Array:
-    """Overburdens evenly in tau = ln P + P/p_1, and evenly in ln P close to the surface of the half-line."""
-    if model.surface_stress:
-        first, thin = _LEAST, np.zeros(0)
-    else:
-        first = min(START * coldest, _start_at_most(t), 0.5 * deepest)
-        thin = first * np.exp(-_THIN_STEP * np.arange(_THIN, 0, -1))
+def _depths(first: float, deepest: float, p_1: float, step: float) -> Array:
+    """Overburdens evenly in tau = ln P + P/p_1."""
     low, high = np.log(first) + first / p_1, np.log(deepest) + deepest / p_1
     tau = np.linspace(low, high, int(np.ceil((high - low) / step)) + 1)
     # ln P by Newton's method: tau is convex in it, so that starting on the high side it comes down.
     log_p = np.minimum(np.where(tau < 0.0, tau, np.log(p_1 * np.maximum(tau, 1.0) + 1.0)), np.log(deepest))
     for _ in range(60):
-        change = (log_p + np.exp(log_p) / p_1 - tau) / (1.0 + np.exp(log_p) / p_1)
+        p = np.exp(log_p)
+        change = (log_p + p / p_1 - tau) / (1.0 + p / p_1)
         log_p = log_p - change
         if np.abs(change).max() < 1e-13:
             break
-    return np.concatenate([thin, np.exp(log_p)])
+    return np.exp(log_p)

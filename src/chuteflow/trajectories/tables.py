@@ -6,14 +6,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from chuteflow.numerics.compiled import compiled
 from chuteflow.numerics.tabulate import Array, FunctionTable
-from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model, evaluate_closures
+from chuteflow.steady.model import CONDUCTION, COUPLING, DENSITY, GAMMA, LOSS, WORK, Model, closure_coordinate
 
 #: The table runs over LOW <= ln x <= LOW + (ENTRIES - 1)/PER_UNIT; outside, the functions are constant.
 LOW, PER_UNIT, ENTRIES = -25.0, 48.0, 4096
@@ -35,45 +38,77 @@ class Tables:
     from both sides, A = (1 - k)/(2 a) from both sides, the largest c = 1 + ((1 + beta) k - beta)/2, the largest
     (1 + beta) a, b from both sides) and over all larger L (the largest net, the smallest A, the largest c, the
     smallest b). ``rate`` is the fastest
-    rate of y in p, and ``scale`` the size of heat fluxes y.
+    rate of y in p, ``steepest`` the largest slope of b, and ``scale`` the size of heat fluxes y.
     """
 
     values: Array
     bounds: Array
     rate: float
+    steepest: float
     scale: float
+
+
+@lru_cache(maxsize=1)
+def _coordinates() -> Array:
+    """Of the entries, in the tables of closures."""
+    return closure_coordinate(np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
 
 
 @lru_cache(maxsize=4)
 def _closures(table: FunctionTable) -> Array:
     """The closures (8, entries) of all chutes with the same grains."""
-    f, _ = evaluate_closures(table, np.exp(LOW + np.arange(ENTRIES) / PER_UNIT))
-    return f
+    return table.values(_coordinates())
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def tables(model: Model) -> Tables:
     """The tables of ``model``."""
     f = _closures(model.table)
-    conduction, coupling = f[CONDUCTION], f[COUPLING]
-    net = f[LOSS] - model.slope**2 * f[WORK]
-    base = model.base_flux(f)
-    height, shearing = np.exp(-f[DENSITY]), f[WORK] * np.exp(0.5 * f[GAMMA])
-    columns = [1.0 / conduction, coupling, net, base, height, shearing, np.full_like(net, model.beta)]
-    values = np.stack(columns, axis=1)
-    curve = 0.5 * (1.0 - coupling) / conduction
-    relax = 1.0 + 0.5 * (coupling * (1.0 + model.beta) - model.beta)
-    lowest, highest = np.minimum.accumulate, np.maximum.accumulate
-    bounds = np.stack(
-        [
-            lowest(net), highest(net), lowest(curve), highest(curve), highest(relax),
-            highest(conduction) * (1.0 + model.beta), lowest(base), highest(base),
-            highest(net[::-1])[::-1], lowest(curve[::-1])[::-1], highest(relax[::-1])[::-1], lowest(base[::-1])[::-1],
-        ],
-        axis=1,
-    )  # fmt: skip
-    rate = float(np.sqrt(2.0 * np.abs(net) / conduction).max())
-    return Tables(values, bounds, rate, model.flux_scale)
+    values, bounds, rate, steepest = _tabulate(f, model.base_flux(f), float(model.slope), float(model.beta))
+    return Tables(values, bounds, rate, steepest, model.flux_scale)
+
+
+@compiled
+def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, float, float]:
+    """Functions, bounds, the fastest rate and the largest slope of b, see :class:`Tables`, from the closures (8,
+    entries) and the heat flux (entries,) that the base would give."""
+    entries = len(base)
+    values = np.empty((entries, 7))
+    bounds = np.empty((entries, 12))
+    rate = steepest = 0.0
+    net_low = curve_low = base_low = np.inf
+    net_high = curve_high = base_high = relax_high = spread = -np.inf
+    for i in range(entries):
+        conduction, coupling = f[CONDUCTION, i], f[COUPLING, i]
+        net = f[LOSS, i] - slope * slope * f[WORK, i]
+        values[i, INVERSE] = 1.0 / conduction
+        values[i, COUPLED] = coupling
+        values[i, NET] = net
+        values[i, BASE] = base[i]
+        values[i, HEIGHT] = math.exp(-f[DENSITY, i])
+        values[i, SHEARING] = f[WORK, i] * math.exp(0.5 * f[GAMMA, i])
+        values[i, BETA] = beta
+        curve = 0.5 * (1.0 - coupling) / conduction
+        relax = 1.0 + 0.5 * (coupling * (1.0 + beta) - beta)
+        net_low, net_high = min(net_low, net), max(net_high, net)
+        curve_low, curve_high = min(curve_low, curve), max(curve_high, curve)
+        base_low, base_high = min(base_low, base[i]), max(base_high, base[i])
+        relax_high = max(relax_high, relax)
+        spread = max(spread, conduction * (1.0 + beta))
+        rate = max(rate, 2.0 * abs(net) / conduction)
+        steepest = max(steepest, abs(base[i] - base[max(i - 1, 0)]) * PER_UNIT)
+        bounds[i, NET_LOW], bounds[i, NET_HIGH] = net_low, net_high
+        bounds[i, CURVE_LOW], bounds[i, CURVE_HIGH] = curve_low, curve_high
+        bounds[i, RELAX_HIGH], bounds[i, SPREAD] = relax_high, spread
+        bounds[i, BASE_LOW], bounds[i, BASE_HIGH] = base_low, base_high
+        bounds[i, NET_ABOVE], bounds[i, CURVE_ABOVE] = net, curve
+        bounds[i, RELAX_ABOVE], bounds[i, BASE_ABOVE] = relax, base[i]
+    for i in range(entries - 2, -1, -1):
+        for highest in (NET_ABOVE, RELAX_ABOVE):
+            bounds[i, highest] = max(bounds[i, highest], bounds[i + 1, highest])
+        for lowest in (CURVE_ABOVE, BASE_ABOVE):
+            bounds[i, lowest] = min(bounds[i, lowest], bounds[i + 1, lowest])
+    return values, bounds, math.sqrt(rate), steepest
 
 
 def base_table(model: Model) -> Array:
