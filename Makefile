@@ -94,8 +94,10 @@ clean: ## remove the environment and all that was made
 	rm -rf $(VENV) dist build demo .hypothesis .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
+# The folder is emptied first, and through a link that would be somebody else's environment.
 $(VENV)/.made:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or later was not found; name one: make PYTHON=..." >&2; exit 1; }
+	@test ! -L $(VENV) || { echo "$(VENV) is a link to another environment, which make leaves alone; remove the link" >&2; exit 1; }
 	@echo "== creating $(VENV) with $$($(PYTHON) --version)"
 	@$(PYTHON) -m venv --clear $(VENV)
 	@touch $@

@@ -43,6 +43,7 @@ def compared() -> list[Row]:
             own,
             "ms",
             own,
+            10.0,
             note=f"folds at Q = {folds[0]:.10f} and {folds[1]:.10f}; estimated error {error:.0e}, and {drift:.0e} "
             "from those at the tightest tolerance",
         )

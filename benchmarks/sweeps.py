@@ -49,8 +49,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows = [
-            rate(folder, "T_surface", 20_000.0, 5_000.0),
-            rate(folder, "Q", 1_000.0, 200.0),
+            rate(folder, "T_surface", 30_000.0, 5_000.0),
+            rate(folder, "Q", 2_500.0, 200.0),
             *overhead(folder, points),
             *memory(folder, points),
         ]

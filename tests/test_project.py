@@ -5,6 +5,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import inspect
+import os
 import re
 import shutil
 import subprocess
@@ -67,6 +68,20 @@ def test_the_installed_package_is_that_of_the_source_folder():
     there, here = contents(installed), contents(SOURCE)
     differing = {name for name in there.keys() | here.keys() if there.get(name) != here.get(name)}
     assert not differing, "the installed wheel is out of date; `make test` renews it"
+
+
+@pytest.mark.skipif(shutil.which("make") is None or os.name == "nt", reason="no make, or no links")
+def test_make_leaves_an_environment_alone_that_is_only_linked_to(tmp_path):
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, tmp_path)
+    others = tmp_path / "others"
+    others.mkdir()
+    (others / "kept").touch()
+    (tmp_path / ".venv").symlink_to(others)
+    done = subprocess.run(["make", f"PYTHON={sys.executable}", "wheel"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert ".venv is a link to another environment, which make leaves alone; remove the link" in done.stderr
+    assert (others / "kept").exists()
 
 
 def test_versions_agree():

@@ -145,7 +145,31 @@ def test_a_result_shows_itself(name):
     result = result_of(name)
     assert "\n" not in repr(result)
     assert len(repr(result)) < 300
-    assert "<table>" in result._repr_html_()
+    assert result._repr_html_().startswith("<p>0 flows" if name == "no flows" else "<table>")
+
+
+def test_a_curve_without_flows_draws_itself_on_an_array_of_axes():
+    nothing = chuteflow.curve(chuteflow.Chute(0.5, 0.8, 0.8, 0.6))
+    assert nothing.plot().shape == (1,)
+    assert "nearest" in nothing._repr_html_()
+
+
+def test_a_study_over_fluxes_is_drawn_in_si_units():
+    chute = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
+    fluxes = np.array([1.0, 4.0, 100.0])
+    ax = chuteflow.scan(chute, e=[0.75, 0.8], Q=fluxes).plot(scales=GRAINS)
+    factor = GRAINS.factor("mass_flux", 0.3)
+    assert ax.get_xlabel() == "mass flux, $Q$ (kg/m/s)"
+    assert ax.get_xscale() == "log"
+    # Cells meet halfway between the fluxes, on an axis of logarithms.
+    edges = ax.collections[0].get_coordinates()[0, :, 0]
+    np.testing.assert_allclose(edges, factor * np.array([0.5, 2.0, 20.0, 500.0]), rtol=1e-12)
+    # Each number of flows has one shade.
+    norm = ax.collections[0].norm
+    assert norm.boundaries[0] % 1.0 == 0.5
+    assert set(np.diff(norm.boundaries)) == {1.0}
+    ax = chuteflow.scan(chute, slope=[0.3, 0.31], Q=fluxes[:2]).plot(scales=GRAINS)
+    assert ax.get_xlabel() == "mass flux, $Q$ (dimensionless)"
 
 
 def test_other_results_are_not_equal():

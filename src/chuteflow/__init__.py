@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from chuteflow.stability.planes import FamilyMap, WaveMap
     from chuteflow.stability.relaxation import Relaxation
     from chuteflow.stability.result import Stability, stability_of
-    from chuteflow.steady.cases import Case, case
+    from chuteflow.steady.cases import Case, case, cases
     from chuteflow.steady.chute import Chute
     from chuteflow.steady.flow import Flow, Profile
     from chuteflow.steady.hot import HotModel, hot
@@ -76,6 +76,7 @@ _HOMES = {
     "WaveMap": "stability.planes",
     "boundary": "bifurcations.boundary",
     "case": "steady.cases",
+    "cases": "steady.cases",
     "closures": "theory.laws",
     "curve": "branches.curve",
     "domain": "maps.domain",
@@ -126,6 +127,7 @@ __all__ = [
     "__version__",
     "boundary",
     "case",
+    "cases",
     "closures",
     "compare",
     "curve",

@@ -1,6 +1,11 @@
 """``python -m chuteflow`` and ``chuteflow``: the command line."""
 
+import gc
 import sys
+
+#: Objects made before unreachable ones are looked for. Nearly all that a command makes are modules, classes and
+#: compiled loops, which stay to its end: to look for others more often takes a fifth of the time of ``solve``.
+_OBJECTS = 100_000
 
 
 def run() -> int:
@@ -8,6 +13,7 @@ def run() -> int:
 
     Interrupts are taken care of before anything large is imported, and up to the end of the process.
     """
+    gc.set_threshold(_OBJECTS)
     try:
         from chuteflow.cli import interrupts
 
@@ -19,6 +25,8 @@ def run() -> int:
         from chuteflow.cli import interrupts
 
         return interrupts.report()
+    finally:
+        gc.freeze()  # the end of the process frees the memory without visiting each object
 
 
 if __name__ == "__main__":

@@ -42,14 +42,17 @@ def counted(count: int, one: str, more: str | None = None) -> str:
 
 
 def html_table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str | None = None) -> str:
-    """A table in HTML; of very many rows the middle ones are left out, and a row in their place says so."""
+    """A table in HTML; of very many rows the middle ones are left out, and a row in their place says so. Without rows
+    it is the caption and the ``note`` alone."""
+    below = f"<p>{escape(note)}</p>" if note else ""
+    if not rows:
+        return f"<p>{escape(caption)}</p>{below}"
     shown = [*rows]
     if len(shown) > _ROWS:
         between = [f"... {len(rows) - _ROWS} more ...", *("" for _ in header[1:])]
         shown = [*rows[: _ROWS // 2], between, *rows[-(_ROWS // 2) :]]
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in shown)
-    below = f"<p>{escape(note)}</p>" if note else ""
     return (
         f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{below}"
     )

@@ -107,7 +107,7 @@ PARAMETERS: dict[str, Parameter] = {
             allowed="above 0 and at most 1",
             rule="must be above 0 (from 1e-8) and at most 1",
             example="0.8",
-            description="restitution of two grains",
+            description="coefficient of restitution of two grains",
         ),
         Parameter(
             name="wall_restitution",
@@ -121,7 +121,7 @@ PARAMETERS: dict[str, Parameter] = {
             allowed="from 0 to 1",
             rule="must be from 0 to 1",
             example="0.8",
-            description="restitution of a grain and the base",
+            description="coefficient of restitution of a grain and the base",
             of_base=True,
         ),
         Parameter(

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from chuteflow import Chute, InputError, curve, flows
+from chuteflow import Chute, InputError, SolveError, curve, flows
+from chuteflow.branches import solution_branches
 from chuteflow.branches.ranges import BranchEnd
+from chuteflow.steady.collocation import LOG_M
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 RANGE = (0.01, 500.0)
@@ -141,7 +143,15 @@ def test_bad_input(given, message):
         curve(PAPER, **given)
 
 
-def test_a_branch_that_is_lost_leaves_the_curve_incomplete():
-    found = curve(Chute(0.37, 0.8, 0.8, 0.6, base="johnson-jackson:specularity=0.1"), points=10)
+def test_a_branch_that_is_lost_leaves_the_curve_incomplete(monkeypatch):
+    refine = solution_branches.refine_path
+
+    def lost(points, tolerance):
+        if points[0].m[LOG_M] < 0.0 <= points[-1].m[LOG_M]:
+            raise SolveError("no")
+        return refine(points, tolerance)
+
+    monkeypatch.setattr(solution_branches, "refine_path", lost)
+    found = curve(PAPER, points=10)
     assert any(BranchEnd.of(end) is BranchEnd.LOST for branch in found.branches for end in branch.ends)
-    assert str(found.incomplete).startswith("a branch could not be followed beyond M = 14.1")
+    assert str(found.incomplete).startswith("a branch could not be followed beyond M = 0.")

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chuteflow import Chute, curve, flows
+from chuteflow import Chute, SolveError, curve, flows
+from chuteflow.branches import solution_branches
 from chuteflow.branches.paths import Chord, locate_turning_points
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.rough_turns import find_extrema
@@ -193,3 +194,44 @@ def test_a_flow_between_the_edge_of_the_range_and_a_rough_end_is_not_lost():
     found = flows(chute, Q=5.079250231686532e-05)
     assert [flow.surface_temperature for flow in found] == pytest.approx([0.0010596683, 0.0010142], rel=4e-3)
     assert all(flow.mass_flux == pytest.approx(5.079250231686532e-05, rel=1e-9) for flow in found)
+
+
+#: Two branches of this chute meet in a fold that the search sees 1 % away, on a wall that is nearly smooth.
+MERGING = Chute(0.37, 0.8, 0.8, 0.6, base="johnson-jackson:specularity=0.1")
+
+
+@pytest.mark.parametrize("mass", [14.6, 14.7, 14.77])
+def test_flows_between_the_fold_that_the_search_saw_and_the_fold_are_found(mass):
+    found = flows(MERGING, M=mass)
+    assert len(found) == 2
+    assert found.incomplete is None
+    assert found[0].mass_flux > found[1].mass_flux > 3300.0
+
+
+def test_a_curve_is_followed_around_a_fold_that_the_search_saw_elsewhere():
+    found = curve(MERGING, points=30)
+    assert found.incomplete is None
+    (branch,) = found.branches
+    folds = [p.flow.mass_holdup for p in branch.special if p.kind == "fold-M" and p.flow.surface_temperature > 1.0]
+    assert folds == pytest.approx([14.78276044], rel=1e-8)
+
+
+def test_a_branch_that_cannot_be_solved_near_the_value_is_told(monkeypatch):
+    def fail(*_):
+        raise SolveError("no")
+
+    monkeypatch.setattr(solution_branches, "refine_path", fail)
+    found = flows(MERGING, M=14.7)
+    assert not found.flows
+    assert found.incomplete is not None
+    assert "could not be followed near M = 14.6" in found.incomplete
+
+
+def test_a_short_piece_beside_a_branch_is_traced_once():
+    chute = Chute(
+        0.46323691751787266, 0.6662771445329538, 0.7099059862043923, 0.7438541675524014,
+        surface="interface", closure="jenkins-berzi",
+    )  # fmt: skip
+    found = curve(chute, points=30)
+    assert len(found.branches) == 2
+    assert found.incomplete is None

@@ -12,7 +12,8 @@ from chuteflow import Chute, boundary
 from chuteflow.bifurcations import diagram as diagrams
 from chuteflow.bifurcations.diagram import diagram
 from chuteflow.cli.program import main
-from chuteflow.io.boundary_records import boundaries_object, save
+from chuteflow.io.boundary_records import boundaries_object
+from chuteflow.io.files import save
 from chuteflow.plotting.boundary_plot import plot_boundaries
 
 CHUTE = Chute(0.3, 0.8, 0.8, 0.6)

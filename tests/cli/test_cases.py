@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 
 import click
@@ -142,11 +143,26 @@ def test_cases_are_listed_and_told(run):
 
 def test_a_case_makes_a_chute_in_python(file):
     assert case("sand").chute(slope=0.35).restitution == 0.7
-    with pytest.raises(chuteflow.InputError, match="sand has no slope"):
+    with pytest.raises(chuteflow.InputError, match=r"sand has no slope: give slope=... \(or angle=... in degrees\)"):
         case("sand").chute()
+    assert case("sand").chute(angle=19, e=0.75) == chuteflow.Chute.at_angle(19, 0.75, 0.7, 0.7)
+    assert chuteflow.cases()["sand"] == case("sand")
+    for wrong, message in (
+        ({"slope": 0.3, "angle": 20}, "slope is given twice, also as angle"),
+        ({"slope": 0.3, "ew": 0.7, "wall_restitution": 0.8}, "wall_restitution is given twice"),
+        ({"slope": 0.3, "rough": 0.6}, "unknown argument 'rough': did you mean roughness?"),
+    ):
+        with pytest.raises(chuteflow.InputError, match=re.escape(message)):
+            case("sand").chute(**wrong)
     mine = read_chute(file)
     assert mine.scales == chuteflow.Scales(1e-3, 2500.0)
     assert mine.chute().roughness == 0.65
+
+
+def test_a_case_shows_how_each_number_is_known():
+    table = case("glass-beads")._repr_html_()
+    assert "<td>roughness</td><td>0.65 </td><td>0.1</td><td>guessed</td>" in table
+    assert "0.003 m" in table
 
 
 # Units
@@ -262,31 +278,103 @@ def test_the_nearest_flux_has_a_flow():
 
 # The table of commands
 
-#: What does not make sense, by command: without a chute there is no case, no grains; what has no picture draws none.
+_CHUTE, _GRAINS, _PICTURE, _ANSWER = ("chute", "case"), ("si",), ("plot",), ("json", "save", "plot")
+#: What does not make sense, by command, and why.
 WITHOUT = {
-    "sweep": ("chute", "case", "si", "json", "save", "plot"),
-    "predict": ("chute", "case", "si"),
-    "design": ("save", "plot"),
-    "cases": ("chute", "case", "si", "save", "plot"),
-    "closures": ("chute", "case", "si"),
-    "figures": ("chute", "case", "si", "json", "save", "plot"),
-    "claims": ("chute", "case", "si", "save", "plot"),
-    "report": ("chute", "case", "si", "json", "save", "plot"),
-    # A group: its parts have options.
-    "dem": ("chute", "case", "si", "json", "save", "plot", "quiet"),
-    "compare": ("chute", "case", "si"),
-    "explore": ("json", "save", "plot"),
+    "sweep": ("the study file says the chutes; results go to its store", (*_CHUTE, *_GRAINS, *_ANSWER)),
+    "predict": ("the chute is that of the fit; --diameter and --density give SI units", (*_CHUTE, *_GRAINS)),
+    "design": ("each flow found is of another chute: one picture does not hold them", _PICTURE),
+    "cases": ("a list of chutes, without flows", (*_CHUTE, *_GRAINS, "save", *_PICTURE)),
+    "closures": ("laws, dimensionless, without a chute", (*_CHUTE, *_GRAINS)),
+    "figures": ("the chutes are those of the paper; pictures are the answer", (*_CHUTE, *_GRAINS, *_ANSWER)),
+    "claims": ("the chutes are those of the paper; a list of verdicts", (*_CHUTE, *_GRAINS, "save", *_PICTURE)),
+    "report": ("the chutes are those of the paper; a page is the answer", (*_CHUTE, *_GRAINS, *_ANSWER)),
+    "compare": ("the run says the chute; it is dimensionless", (*_CHUTE, *_GRAINS)),
+    "explore": ("a page is the answer", _ANSWER),
+    "dem run": ("grains are simulated without units; the run is the answer", (*_GRAINS, *_ANSWER)),
+    "dem read": ("it turns the files of a run into one", (*_CHUTE, *_GRAINS, *_ANSWER, "quiet")),
+    "dem study": ("the chutes are those of the study; its runs are the answer", (*_CHUTE, *_GRAINS, *_ANSWER)),
+    "dem waves": ("the run says the chute", (*_CHUTE, *_GRAINS, "json", *_PICTURE, "quiet")),
+    "dem results": ("the files say the chutes; a table is the answer", (*_CHUTE, *_GRAINS, "json", "save")),
 }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_accepts_what_makes_sense(name):
-    command = program.get_command(click.Context(program), name)
-    assert command is not None
-    accepted = {option.removeprefix("--") for param in command.params for option in param.opts}
-    wanted = {"chute", "case", "si", "json", "save", "plot", "quiet"} - set(WITHOUT.get(name, ()))
-    assert wanted <= accepted
-    assert accepted.isdisjoint(WITHOUT.get(name, ()))
+def every_command():
+    """All commands by name, those of groups too."""
+    for name in COMMANDS:
+        command = program.get_command(click.Context(program), name)
+        assert command is not None
+        parts = command.commands if isinstance(command, click.Group) else None
+        yield from [(name, command)] if parts is None else [(f"{name} {part}", one) for part, one in parts.items()]
+
+
+def test_every_command_accepts_what_makes_sense():
+    found = dict(every_command())
+    assert found.keys() >= WITHOUT.keys()
+    for name, command in found.items():
+        accepted = {option.removeprefix("--") for param in command.params for option in param.opts}
+        _, without = WITHOUT.get(name, ("", ()))
+        assert {"chute", "case", "si", "json", "save", "plot", "quiet"} - accepted == set(without), name
+
+
+#: A question of each command that has a chute, an amount and grains.
+ASKED = {
+    "solve": ["--flux", "3"],
+    "curve": [],
+    "boundary": ["--of", "fold-Q"],
+    "domain": ["--roughness", "0.5:0.6"],
+    "hot": [],
+    "sensitivities": ["--flux", "3"],
+    "fit": ["data.csv", "--free", "e"],
+    "design": ["--unknown", "e", "--flux", "3", "--holdup", "1"],
+    "compare-closures": ["--flux", "3"],
+    "explore": ["--no-browser"],
+    "stability": ["--flux", "3"],
+    "growth": ["--flux", "3"],
+    "neutral": [],
+    "relax": ["--flux", "3"],
+}
+_NO_SLOPE = ["--e", "0.8", "--ew", "0.8"]
+_BASE = ["--roughness", "0.6"]
+
+
+@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize(
+    ("mistake", "message"),
+    [
+        (["--slope", "17"], "did you mean --angle 17? A slope is tan(theta)"),
+        (["--angle", "0.3"], "did you mean --slope 0.3? An angle is in degrees"),
+        (["--slope", "0.3", "--angle", "17"], "give one of them, not both"),
+        (["--slope", "0.3", "--diameter", "1 s", "--density", "2500"], "'s' is not a unit like m"),
+        (["--slope", "0.3", "--diameter", "1 mm"], "--density is missing"),
+        (["--slope", "0.3", "--si"], "--diameter is missing"),
+        (["--case", "sand", "--chute", "mine.toml"], "give one of them"),
+        (["--case", "sandy"], "did you mean sand?"),
+    ],
+)
+def test_mistakes_of_units_and_slopes_are_one_line(run, name, mistake, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data.csv").write_text("z,nu\n0,0.3\n1,0.2\n2,0.1\n")
+    base = [] if name == "domain" else _BASE
+    if name in ("boundary", "domain"):
+        # A range in the place of the first slope or angle.
+        ranged = [i + 1 for i, one in enumerate(mistake) if one in ("--slope", "--angle")][:1]
+        mistake = [f"{one}:{float(one) + 0.1:g}" if i in ranged else one for i, one in enumerate(mistake)]
+    code, out, err = run(name, ASKED[name], _NO_SLOPE, base, mistake)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert message in err
+
+
+def test_a_range_of_angles_is_one_of_slopes(run):
+    ask = "boundary --of fold-Q --in e,Q --e 0.7:0.8 --ew 0.8 --roughness 0.6"
+    code, out, err = run(ask, ["--angle", "15:17"])
+    assert (code, out) == (2, "")
+    low, high = (math.tan(math.radians(angle)) for angle in (15, 17))
+    assert f"--slope {low:g}:{high:g}: only --e takes a range" in err
+    code, out, err = run(ask, ["--angle", "15:17", "--slope", "0.3"])
+    assert (code, out) == (2, "")
+    assert "--slope and --angle 15:17: give one of them, not both" in err
 
 
 # Numbers of a flow

@@ -67,6 +67,17 @@ def test_a_fit_is_printed_saved_and_predicted_from(flow, tmp_path, capsys):
     assert predicted["chute"]["slope"] == 0.29
     assert all(0.0 < one["errors"]["M"] < 0.1 for one in predicted["flows"])
     assert predicted["folds"][0]["relative_error"] > 0.0
+    scales = Scales(1e-3, 2500.0)
+    flux = scales.factor("mass_flux", 0.29)
+    grains = ("--diameter", "1 mm", "--density", "2500")
+    in_si = answer(capsys, "predict", out, "--slope", "0.29", "--flux", f"{3.0 * flux!r} kg/m/s", *grains)
+    assert in_si["units"]["Q"] == "kg/m/s"
+    for name, symbol in (("mass_flux", "Q"), ("mass_holdup", "M")):
+        by = scales.factor(name, 0.29)
+        assert in_si["flows"][0]["flow"][symbol] == pytest.approx(by * predicted["flows"][0]["flow"][symbol])
+        assert in_si["flows"][0]["errors"][symbol] == pytest.approx(by * predicted["flows"][0]["errors"][symbol])
+    assert in_si["folds"][0]["value"] == pytest.approx(flux * predicted["folds"][0]["value"])
+    assert in_si["flows"][0]["profiles"]["z"][-1] == pytest.approx(1e-3 * predicted["flows"][0]["profiles"]["z"][-1])
     known_all = answer(capsys, "predict", out, "--e", "0.8", "--flux", "3")
     assert known_all["parameters"] == []
     assert known_all["flows"][0]["errors"]["M"] == 0.0
@@ -179,6 +190,10 @@ def test_bad_data_are_one_line(content, said, tmp_path, capsys):
         (["sensitivities", *PAPER, "--flux", "3", "--fixed", "u"], "choose one of T_surface, Q, M, h"),
         (["sensitivities", *PAPER, "--flux", "3", "--parameters", "e,x"], "unknown parameter 'x'"),
         (["design", *PAPER, "--flux", "3"], "missing --unknown"),
+        (
+            ["design", *PAPER[2:], "--unknown", "slope", "--flux", "3 kg/m/s", "--holdup", "1"],
+            "which is unknown: omit the unit",
+        ),
         (["design", *PAPER, "--unknown", "slope", "--flux", "3"], "1 condition for 1 unknown parameter"),
         (["design", *PAPER, "--unknown", "slope", "--flux", "3", "--want", "width=3"], "unknown quantity 'width'"),
     ],
@@ -220,3 +235,22 @@ def test_a_chute_is_designed(capsys):
         assert one["flow"]["M"] == pytest.approx(1.0, abs=1e-6)
         assert one["flow"]["Q"] == pytest.approx(3.0, abs=1e-6)
     assert found["solutions"]
+
+
+@pytest.mark.slow
+def test_a_chute_is_designed_in_si_units_and_saved(tmp_path, capsys):
+    scales, saved = Scales(1e-3, 2500.0), tmp_path / "design.csv"
+    flux = 3.0 * scales.factor("mass_flux", 0.3)
+    asked = ["--unknown", "e", "--slope", "0.3", *PAPER[4:], "--flux", f"{flux!r} kg/m/s", "--holdup", "1"]
+    found = answer(capsys, "design", *asked, "--diameter", "1 mm", "--density", "2500", "--save", str(saved))
+    assert [one["flow"]["Q"] for one in found["solutions"]] == pytest.approx([flux] * len(found["solutions"]))
+    head, *rows = saved.read_text(encoding="utf-8").splitlines()
+    assert head.startswith("slope,e,ew,roughness,Q [kg/m/s]")
+    assert len(rows) == len(found["solutions"]) > 0
+
+
+def test_flows_without_a_name_are_not_taken_for_one(tmp_path, capsys):
+    path = tmp_path / "data.csv"
+    path.write_text("Q,h\n1,2\n2,3\n", encoding="utf-8")
+    assert main(["fit", str(path), *PAPER, "--free", "e"]) == BAD_INPUT
+    assert "where rows are several flows, name them in a column experiment" in capsys.readouterr().err

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, InputError, Scales, flows
-from chuteflow.io.units import in_si, read_amount, read_si
+from chuteflow.amounts import read_si
+from chuteflow.io.units import in_si, read_amount
 
 GRAINS = Scales(diameter=2e-3, density=2500.0)
 
@@ -43,6 +44,30 @@ def test_an_amount_with_a_unit_is_made_dimensionless():
     assert read_amount("--flux", "3", "mass_flux", GRAINS, 0.3) == 3.0
     with pytest.raises(InputError, match="a unit needs the grains"):
         read_amount("--flux", "3 kg/m/s", "mass_flux", None, 0.3)
+
+
+def test_grains_are_given_with_units():
+    assert Scales("2 mm", "2.5 g/cm^3").diameter == pytest.approx(2e-3, rel=1e-12)
+    assert Scales("2 mm", 2500) == GRAINS
+    for wrong, message in (
+        ({"diameter": "2 s"}, "'s' is not a unit like m"),
+        ({"diameter": "2"}, "must be a number, in m, or a text with a unit"),
+        ({"diameter": "0 mm"}, "must be a positive number"),
+    ):
+        with pytest.raises(InputError, match=message):
+            Scales(**{"density": 2500.0, **wrong})
+
+
+def test_an_amount_in_si_units_is_made_dimensionless_in_python():
+    factor = GRAINS.factor("mass_flux", 0.3)
+    assert GRAINS.dimensionless("mass_flux", 0.5, 0.3) == pytest.approx(0.5 / factor)
+    assert GRAINS.dimensionless("mass_flux", "500 g/m/s", 0.3) == pytest.approx(0.5 / factor)
+    assert GRAINS.dimensionless("mass_flux", "2e-4 m^2/s", 0.3) == pytest.approx(0.5 / factor)
+    for amount in ("0.5 kg", "much", True):
+        with pytest.raises(InputError, match="mass_flux"):
+            GRAINS.dimensionless("mass_flux", amount, 0.3)
+    with pytest.raises(InputError, match="slope = "):
+        GRAINS.factor("mass_flux", Chute(0.3, 0.8, 0.8, 0.6))  # pyright: ignore[reportArgumentType]
 
 
 def test_a_flow_in_si_units_by_hand():

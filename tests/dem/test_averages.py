@@ -11,7 +11,7 @@ from chuteflow.dem.contacts import MASS, PAIR_MASS
 from chuteflow.dem.correlation import correlation_time, long_run_variance
 from chuteflow.dem.output import Frame, Layers
 from chuteflow.dem.script import BIN, MOMENTS
-from chuteflow.dem.steadiness import Drift, drift, verdict
+from chuteflow.dem.steadiness import Drift, drift, overall_steadiness
 
 BINS = 200
 
@@ -191,15 +191,15 @@ def test_drift_is_told_with_its_error(slope, noise, expected):
     t = np.arange(600.0)
     random = np.random.default_rng(3)
     found = drift(t, 4.0 * (1.0 + slope * (t - 300.0)) + 4.0 * noise * random.normal(size=t.size))
-    assert found.verdict == expected
+    assert found.steadiness == expected
     assert abs(found.value - 300.0 * slope) < 4.0 * found.error
 
 
 def test_one_drift_that_is_not_steady_decides():
     steady, moving = Drift(0.001, 0.001), Drift(0.2, 0.01)
-    assert verdict({"a": steady, "b": steady}) == "steady"
-    assert verdict({"a": steady, "b": moving}) == "not steady"
-    assert verdict({"a": steady, "b": drift(np.arange(3.0), np.ones(3))}) == "undecided"
+    assert overall_steadiness({"a": steady, "b": steady}) == "steady"
+    assert overall_steadiness({"a": steady, "b": moving}) == "not steady"
+    assert overall_steadiness({"a": steady, "b": drift(np.arange(3.0), np.ones(3))}) == "undecided"
 
 
 def test_friction_is_at_most_its_share_of_the_press(small):

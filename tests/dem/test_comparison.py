@@ -85,7 +85,7 @@ def test_a_flow_of_the_theory_agrees_with_itself_and_not_with_others(itself):
     assert len(own) == 1
     for one in own[0].differences:
         assert abs(one.relative) < 3e-3, one
-        assert one.verdict == "agrees"
+        assert one.agreement == "agrees"
     lun, other = found.functions
     for one in lun.differences:
         # Linear interpolation between the heights is all that differs.
@@ -94,7 +94,7 @@ def test_a_flow_of_the_theory_agrees_with_itself_and_not_with_others(itself):
     viscosity = {d.name: d for d in other.differences}["g2"]
     assert abs(viscosity.relative) > 5e-3
     by_spacing = {d.name: d for d in lun.differences}["slip, r by spacing"]
-    assert by_spacing.verdict == "differs"
+    assert by_spacing.agreement == "differs"
     # The same flow is found at its flux too.
     at_flux = [one for one in found.candidates if (one.closure, one.mapping, one.condition) == ("lun", "area", "Q")]
     assert min(abs(one.differences[0].relative) for one in at_flux) < 1e-6
@@ -131,19 +131,19 @@ def test_what_is_not_measured_is_not_compared(itself):
 def test_the_picture_shows_the_measured_profile_and_the_flows(itself):
     figure = plot_comparison(compare(itself, ["lun"]))
     points, *lines = (np.asarray(line.get_xydata()).T for line in figure.axes[0].get_lines())
-    share = itself.share
-    good = share >= 0.02
+    fraction = itself.fraction_above
+    good = fraction >= 0.02
     np.testing.assert_allclose(points[0], itself.fields["volume_fraction"][good])
-    np.testing.assert_allclose(points[1], share[good])
+    np.testing.assert_allclose(points[1], fraction[good])
     assert len(lines) == 2
     # The theory's own flow passes through the points.
     nearest = np.interp(0.5, lines[0][1], lines[0][0])
-    assert nearest == pytest.approx(np.interp(0.5, share[::-1], itself.fields["volume_fraction"][::-1]), rel=1e-3)
+    assert nearest == pytest.approx(np.interp(0.5, fraction[::-1], itself.fields["volume_fraction"][::-1]), rel=1e-3)
 
 
 def test_the_picture_has_no_empty_layer_below_the_grains(itself):
     below = {name: np.concatenate([[1e-3 * values[0]], values[1:]]) for name, values in itself.fields.items()}
-    assert itself.share[0] > 0.99
+    assert itself.fraction_above[0] > 0.99
     figure = plot_comparison(compare(replace(itself, fields=below), ["lun"]))
     nu = np.asarray(figure.axes[0].get_lines()[0].get_xdata())
     np.testing.assert_allclose(nu[0], itself.fields["volume_fraction"][1])

@@ -198,7 +198,7 @@ def test_momentum_and_energy_balance(lammps, tmp_path):
     for _ in go_on(run):
         pass
     found = measure(run)
-    inside = (found.share > 0.1) & (found.share < 0.9)
+    inside = (found.fraction_above > 0.1) & (found.fraction_above < 0.9)
     p, slope = found.fields["overburden"], found.slope
     for name, weight in (("normal_stress", 1.0), ("shear_stress", slope)):
         off = found.fields[name] - weight * p

@@ -10,7 +10,7 @@ import pytest
 from chuteflow.branches.enumeration import flows
 from chuteflow.cli.program import main
 from chuteflow.dem import records, study
-from chuteflow.dem.recovery import recovered
+from chuteflow.dem.recovery import recover
 from chuteflow.dem.results import read_folder, rest_slope, table, thinned
 from chuteflow.errors import InputError
 from chuteflow.plotting.results_plot import plot_results
@@ -133,7 +133,7 @@ FREE = ["e", "ew", "roughness"]
     ["hot01-triangular-1", "hot01-triangular-2", "hot01-triangular-3", "hot01-random-1", "hot10-triangular-1", "finer"],
 )
 def test_the_restitution_of_the_grains_comes_back(name):
-    found = recovered(records.load(DATA / f"{name}.csv"), "lun", FREE)
+    found = recover(records.load(DATA / f"{name}.csv"), "lun", FREE)
     assert found.fit.values[0] == pytest.approx(0.95, abs=0.003)
 
 
@@ -141,7 +141,7 @@ def test_the_restitution_of_the_grains_comes_back(name):
 @pytest.mark.skipif(not DATA.exists(), reason="the data of the study are part of the repository, not of the package")
 def test_that_of_inelastic_grains_comes_back_under_the_law_for_these_alone():
     measured = records.load(DATA / "paper-B-hot.csv")
-    inside, outside = (recovered(measured, law, FREE).fit.estimates[0] for law in ("garzo-dufty-fourier", "lun"))
+    inside, outside = (recover(measured, law, FREE).fit.estimates[0] for law in ("garzo-dufty-fourier", "lun"))
     assert inside.interval.low < 0.8 < inside.interval.high
     assert inside.value == pytest.approx(0.8, abs=0.01)
     assert outside.interval.low > 0.8

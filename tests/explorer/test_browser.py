@@ -211,7 +211,7 @@ def test_any_value_can_be_typed_and_taken_back(page, names):
         field.press("Enter")
         expect(failure).to_be_hidden()
         expect(page.locator("#says")).to_have_text(says)
-    expect(page.locator("main")).not_to_have_class("of-before")
+    expect(page.locator("main")).not_to_have_class("outdated")
 
 
 def place_of(route):
@@ -352,12 +352,12 @@ def test_regions_of_the_map_end_in_points_and_slanted_lines(page):
     # A boundary that is steep: each column has it somewhere else, those beside it not at all.
     def column(route):
         place = place_of(route)
-        share = 0.5 + (place - 0.5) / 0.1
+        fraction = 0.5 + (place - 0.5) / 0.1
         low, high = 0.5, 3**0.5 / 2
-        inside = 0.0 < share < 1.0
+        inside = 0.0 < fraction < 1.0
         part = {
-            "stops": [low + share * (high - low)] if inside else [],
-            "values": [2, 1] if inside else [2 if share >= 1.0 else 1],
+            "stops": [low + fraction * (high - low)] if inside else [],
+            "values": [2, 1] if inside else [2 if fraction >= 1.0 else 1],
         }
         none = {"stops": [], "values": [0]}
         parts = {"most": part, "families": part, "interior": none, "density": none, "hot": none}
@@ -648,12 +648,12 @@ def test_the_chosen_case_is_shown_as_long_as_it_holds(page):
     page.locator("#slope-slider").press("ArrowRight")
     expect(shown).to_have_text("glass-beads")
     page.locator("#e-slider").press("ArrowRight")
-    expect(shown).to_have_text("own numbers")
+    expect(shown).to_have_text("custom")
     expect(page.locator("#case-words")).to_be_empty()
 
 
-def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
-    def judged(route):
+def test_flows_of_the_curve_are_examined_one_by_one_and_no_more_is_said(page):
+    def examined(route):
         query = parse_qs(urlsplit(route.request.url).query)
         if "point" not in query:
             route.fulfill(json={"state": "unknown", "says": "not known", "waves": ""})
@@ -665,21 +665,21 @@ def test_flows_of_the_curve_are_judged_one_by_one_and_no_more_is_said(page):
 
     asked = []
     page.unroute("**/ask/stability?*")
-    page.route("**/ask/stability?*", judged)
+    page.route("**/ask/stability?*", examined)
     opened(page)
-    said = page.locator("#judged")
+    said = page.locator("#stability-words")
     expect(said).to_have_text(
         "Stability of 9 flows of the curve: × unstable (3), ■ stable (3), ? not known (3). "
-        "Between them nothing is known. Each was held against at least the waves of 11 to 91 d."
+        "Between them nothing is known. Each was examined for waves of at least 11 to 91 d."
     )
     assert len(set(asked)) == 9
-    assert page.locator("#curve .verdict").count() == 9
-    assert page.locator("#curve .verdict.stable title").all_text_contents() == ["it is stable"] * 3
-    page.locator("#judge").uncheck()
-    expect(said).to_have_text("Stability along the curve is not looked at.")
-    expect(page.locator("#curve .verdict")).to_have_count(0)
-    page.locator("#judge").check()
-    expect(page.locator("#curve .verdict")).to_have_count(9)
+    assert page.locator("#curve .stability-mark").count() == 9
+    assert page.locator("#curve .stability-mark.stable title").all_text_contents() == ["it is stable"] * 3
+    page.locator("#stability").uncheck()
+    expect(said).to_have_text("Stability along the curve is not examined.")
+    expect(page.locator("#curve .stability-mark")).to_have_count(0)
+    page.locator("#stability").check()
+    expect(page.locator("#curve .stability-mark")).to_have_count(9)
     page.locator("#Q-slider").press("ArrowRight")
     expect(said).to_contain_text("Stability of 9 flows")
     # Where the question cannot be posed, it is asked once.
@@ -800,6 +800,65 @@ def test_what_was_measured_is_drawn_behind_the_flows(page):
     expect(page.locator("#profile-nu .measured")).to_have_count(0)
 
 
+MEASURED = b"z,nu,Q,h\n0.5,0.4,4,3\n1.5,0.3,,\n2.5,0.2,,\n"
+
+
+@pytest.mark.slow
+def test_measurements_are_loaded_from_a_file_by_hand_and_dropped(page, tmp_path):
+    opened(page)
+    own = {"name": "own.csv", "mimeType": "text/csv", "buffer": MEASURED}
+    chooser = page.get_by_label("Load measurements")
+    chooser.focus()
+    with page.expect_file_chooser() as chosen:
+        chooser.press("Space")
+    chosen.value.set_files([own])
+    expect(page.locator("#load-words")).to_have_text("1 measured flow is drawn.")
+    expect(page.locator("#profile-nu .measured")).to_have_count(3)
+    expect(page.locator("#curve .measured")).to_have_count(1)
+    # What is wrong is told on a line, and the rest is drawn.
+    chooser.set_input_files([{**own, "name": "bad.csv", "buffer": b"a,b\n1,2\n"}, {**own, "name": "other.csv"}])
+    expect(page.locator("#load-words")).to_contain_text("1 measured flow is drawn. bad.csv: unknown column 'a'")
+    expect(page.locator("#data li")).to_have_count(2)
+    chooser.set_input_files([{**own, "name": "large.csv", "buffer": b"1" * 2_000_001}])
+    expect(page.locator("#load-words")).to_contain_text("has more than 2 MB")
+    # Or dropped anywhere.
+    page.evaluate(
+        """(text) => {
+          const dataTransfer = new DataTransfer();
+          dataTransfer.items.add(new File([text], "dropped.csv"));
+          document.querySelector("main").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
+        }""",
+        MEASURED.decode(),
+    )
+    expect(page.locator("#data li")).to_have_count(3)
+    # The page that needs no server has those that are shown.
+    page.locator("#data input").nth(1).uncheck()
+    with page.expect_download(timeout=100_000) as download:
+        page.locator("[data-export=page-html]").click()
+    path = tmp_path / "chuteflow.html"
+    download.value.save_as(path)
+    page.goto(path.as_uri())
+    expect(page.locator("#data li")).to_have_count(2)
+    expect(page.locator("#data li").nth(1)).to_contain_text("dropped")
+    expect(page.locator("#profile-nu .measured")).to_have_count(6)
+    assert page.locator(".served:visible").count() == 0
+
+
+@pytest.mark.slow
+def test_the_page_opens_with_the_chute_of_the_command_line_at_any_address(page):
+    about = page.request.get("/about").json() | {"first": {"slope": 0.35, "Q": 2.0, "si": "1", "d": "2.0"}}
+    page.route("**/about", lambda route: route.fulfill(json=about))
+    opened(page)
+    expect(page.locator("#slope")).to_have_value("0.35")
+    expect(page.locator("#si")).to_be_checked()
+    page.locator("#si").uncheck()
+    page.wait_for_timeout(400)
+    # What was changed is kept by the address, also where it is the usual.
+    assert parse_qs(urlsplit(page.url).query, keep_blank_values=True)["si"] == [""]
+    page.reload()
+    expect(page.locator("#si")).not_to_be_checked()
+
+
 @pytest.mark.slow
 def test_the_map_follows_the_sliders_coarsely_and_is_fine_when_they_rest(page):
     def column(route):
@@ -905,7 +964,7 @@ def test_nothing_moves_that_one_has_not_moved(page, width):
             .observe({ type: 'layout-shift', buffered: true });"""
     )
     opened(page)
-    # What comes late is the stability of the flows, and judged flows of the curve.
+    # What comes late is the stability of the flows, and examined flows of the curve.
     page.wait_for_timeout(1500)
     sum_before = page.evaluate("shifts.reduce((sum, value) => sum + value, 0)")
     for place in range(380, 400, 4):
@@ -923,7 +982,7 @@ def test_nothing_moves_that_one_has_not_moved(page, width):
 def test_a_touch_reads_a_chart(tab):
     context = tab.context.browser.new_context(base_url=tab.address, has_touch=True)
     page = context.new_page()
-    opened(page, "?judge=")
+    opened(page, "?stability=")
     box = page.locator("#profile-T").bounding_box()
     page.touchscreen.tap(box["x"] + 60, box["y"] + 120)
     expect(page.locator("#profile-T .tip")).to_be_visible()
@@ -942,7 +1001,7 @@ def test_the_button_writes_a_page_that_needs_no_server(page, tmp_path):
     assert 100_000 < path.stat().st_size < 2_000_000
     page.goto(path.as_uri())
     expect(page.locator("#says")).to_contain_text("Three flows share the flux Q = 3.42")
-    expect(page.locator("#kept-words")).to_contain_text(
+    expect(page.locator("#standalone-words")).to_contain_text(
         "grains: diameter 0.002 m, density 2500 kg/m^3", ignore_case=True
     )
     assert page.locator(".served:visible").count() == 0

@@ -18,13 +18,13 @@ import uvicorn
 
 from chuteflow.explorer import connections
 from chuteflow.explorer.connections import Connection, Server
-from chuteflow.explorer.server import application, bound
+from chuteflow.explorer.server import application, bind_socket
 
 
 @contextmanager
 def serving(compute):
     """The port of a server in a thread of this process."""
-    listener = bound("127.0.0.1", 0)
+    listener = bind_socket("127.0.0.1", 0)
     served = application(compute=compute)
     server = Server(
         uvicorn.Config(served, http=Connection, ws="none", log_level="error", lifespan="on"),
@@ -88,7 +88,7 @@ def test_who_floods_is_dropped_and_no_other(compute, half_sent):
 
 
 def test_where_there_is_no_room_the_client_with_the_most_connections_gives_it(compute, monkeypatch, half_sent):
-    monkeypatch.setattr(connections, "most", lambda: 50)
+    monkeypatch.setattr(connections, "connection_limit", lambda: 50)
     with serving(compute) as port, half_sent(port, 48), half_sent(port, 10, "127.0.0.2") as others:
         assert status(port, source="127.0.0.2") == 200
         for one in others:
@@ -126,9 +126,9 @@ def test_there_are_fewer_connections_than_files_allowed(monkeypatch):
     resource = pytest.importorskip("resource")
     for files, count in ((256, 192), (1_000_000, 512), (resource.RLIM_INFINITY, 512), (10, 8)):
         monkeypatch.setattr(resource, "getrlimit", lambda which, n=files: (n, n))
-        assert connections.most() == count
+        assert connections.connection_limit() == count
     monkeypatch.setitem(sys.modules, "resource", None)
-    assert connections.most() == 512
+    assert connections.connection_limit() == 512
 
 
 # --- the end --------------------------------------------------------------------------------------------------------

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from starlette.testclient import TestClient
 
 import chuteflow
 from chuteflow.cli.program import main
 from chuteflow.dem import records
 from chuteflow.explorer.about import about
 from chuteflow.explorer.data import read_data
+from chuteflow.explorer.server import LARGEST_FILE, application
 
 RUNS = Path(__file__).parents[2] / "docs" / "measured" / "particles"
 TABLE = """experiment,z [mm],nu,nu_error,Q,slope
@@ -96,3 +98,66 @@ def test_the_page_is_told(table):
     found = read_data([RUNS / "hot01-random-1.csv"])
     assert about(found)["data"] == found
     assert about()["data"] == []
+
+
+# Files that are sent
+
+
+@pytest.fixture(scope="module")
+def client():
+    with TestClient(application(), base_url="http://127.0.0.1:8765") as client:
+        yield client
+
+
+def test_a_file_that_is_sent_is_read_as_one_of_the_command_line(table, client):
+    grains = {"diameter": "0.002", "density": "2500"}
+    given = client.post("/data", params={"name": "own.csv", "slope": "0.3", **grains}, content=table.read_bytes())
+    assert given.status_code == 200
+    assert given.json()["data"] == read_data([table], slope=0.3, scales=chuteflow.Scales(2e-3, 2500.0))
+    # Its numbers in units belong to this slope, whatever the sliders say later.
+    assert [one["slope"] for one in given.json()["data"]] == [0.3, 0.3]
+    run = RUNS / "paper-C-cold.csv"
+    given = client.post("/data", params={"name": "paper-C-cold.csv"}, content=run.read_bytes())
+    assert given.json()["data"] == read_data([run])
+
+
+def test_a_netcdf_file_is_sent(tmp_path, client):
+    path = tmp_path / "run.nc"
+    records.save(records.load(RUNS / "paper-C-cold.csv"), path)
+    given = client.post("/data", params={"name": "run.nc"}, content=path.read_bytes())
+    assert given.json()["data"] == read_data([path])
+
+
+@pytest.mark.parametrize(
+    ("query", "content", "status", "said"),
+    [
+        ({"name": "own.csv"}, b"a,b\n1,2\n", 400, "own.csv: unknown column 'a'"),
+        ({"name": "own.csv"}, b"", 400, "own.csv: "),
+        ({"name": "own.csv"}, b"z [mm],u\n1,2\n2,3\n3,4\n", 400, "tick SI units"),
+        ({"name": "own.csv"}, b"\x00\xff" * 500, 400, "own.csv: "),
+        ({"name": "run.nc"}, b"not HDF5", 400, "run.nc"),
+        ({"name": "own.toml"}, b"", 400, "must be a file .csv or .nc"),
+        ({"name": "../../own.csv"}, b"a,b\n1,2\n", 400, "own.csv: unknown column 'a'"),
+        ({"name": "a\n.csv"}, b"", 400, "must be a file .csv or .nc"),
+        ({"name": "x" * 300 + ".csv"}, b"", 400, "must be a file .csv or .nc"),
+        ({}, b"", 400, "must be a file .csv or .nc"),
+        ({"name": "own.csv", "slope": "x"}, b"", 400, "slope = 'x'"),
+        ({"name": "own.csv", "diameter": "1"}, b"", 400, "only diameter is given"),
+        ({"name": "own.csv", "colour": "1"}, b"", 400, "unknown parameter 'colour'"),
+        ({"name": "own.csv"}, b"1" * (LARGEST_FILE + 1), 413, "more than 2 MB"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_line(query, content, status, said, client):
+    given = client.post("/data", params=query, content=content)
+    assert given.status_code == status
+    assert said in given.json()["error"]
+    assert "\n" not in given.json()["error"]
+    assert "/tmp" not in given.json()["error"]
+
+
+def test_files_are_sent_to_one_place_and_from_its_own_pages(client):
+    assert client.get("/data").status_code == 405
+    assert client.get("/ask/data").status_code == 404
+    assert client.post("/about").status_code == 405
+    headers = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "cors"}
+    assert client.post("/data", params={"name": "own.csv"}, content=b"", headers=headers).status_code == 403

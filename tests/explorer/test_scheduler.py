@@ -9,7 +9,7 @@ import pytest
 
 from chuteflow.explorer import scheduler as scheduling
 from chuteflow.explorer.scheduler import Scheduler, Stage
-from chuteflow.explorer.worker import Ended, Limits, Worker
+from chuteflow.explorer.worker import Limits, NoAnswer, Worker
 
 ONE, OTHER = ("127.0.0.1", 1), ("127.0.0.2", 2)
 
@@ -67,7 +67,7 @@ def test_a_slow_question_holds_up_no_other_client(played, tmp_path):
         slow = [asyncio.ensure_future(scheduler.ask("curve", does("loop", name=i), ONE)) for i in range(4)]
         # Each was tried as a quick question.
         await asyncio.sleep(0.5)
-        while scheduler._crews["quick"].waiting:
+        while scheduler._pools["quick"].waiting:
             await asyncio.sleep(0.05)
         times = []
         for i in range(10):
@@ -143,7 +143,7 @@ def test_who_waits_too_long_for_a_worker_is_told(played, monkeypatch):
 
     async def play(scheduler):
         slow = [asyncio.ensure_future(naps(scheduler, 60.0, ONE, f"slow-{i}")) for i in range(2)]
-        while sum(job.worker is not None for job in scheduler._under_way.values()) < 2:
+        while sum(job.worker is not None for job in scheduler._running.values()) < 2:
             await asyncio.sleep(0.05)
         monkeypatch.setattr(scheduling, "_LONGEST_WAIT", 0.3)
         told = await naps(scheduler, 0.0, OTHER, "a")
@@ -191,29 +191,31 @@ def test_the_first_worker_starts_alone(played, starts):
 @pytest.mark.usefixtures("starts")
 def test_waiting_for_the_first_worker_counts_for_no_question(played, monkeypatch):
     monkeypatch.setattr(scheduling, "_LONGEST_WAIT", 0.3)
-    monkeypatch.setattr(scheduling, "_PATIENCE", 0.05)
+    monkeypatch.setattr(scheduling, "_POLL", 0.05)
     assert played(lambda scheduler: scheduler.ask("map", does("nap", seconds=0), ONE)).status == 200
 
 
-def test_every_worker_of_the_explorer_is_warm_before_it_answers():
+def test_every_worker_of_the_explorer_is_warmed_up_before_it_answers():
     scheduler = Scheduler()
     try:
-        warm = [worker._warm for crew in scheduler._crews.values() for worker in crew.workers]
-        assert all([question for question, _ in questions] == ["flows", "curve"] for questions in warm)
+        warm_up = [worker._warm_up for pool in scheduler._pools.values() for worker in pool.workers]
+        assert all([question for question, _ in questions] == ["flows", "curve"] for questions in warm_up)
     finally:
         scheduler.close()
 
 
 def test_what_nobody_waits_for_is_ended_or_not_begun(played, tmp_path):
-    async def gone():
+    async def disconnected():
         return True
 
     async def play(scheduler):
-        stages = [scheduler.ask("stability", does("loop", log=tmp_path / "log", name=i), ONE, gone) for i in range(8)]
+        stages = [
+            scheduler.ask("stability", does("loop", log=tmp_path / "log", name=i), ONE, disconnected) for i in range(8)
+        ]
         left = await asyncio.gather(*stages)
         process = said(await scheduler.ask("stability", does("tell"), ONE))["process"]
         # The process that was ended goes on with the next question.
-        assert process in [worker.pid for worker in scheduler._crews["stability"].workers]
+        assert process in [worker.pid for worker in scheduler._pools["stability"].workers]
         return {answer.status for answer in left}
 
     began = time.monotonic()
@@ -226,11 +228,11 @@ def test_a_question_that_is_asked_again_while_it_is_ended_is_answered(played):
     async def play(scheduler):
         query, leaves = does("nap", seconds=1.0), asyncio.Event()
 
-        async def gone():
+        async def disconnected():
             return leaves.is_set()
 
-        first = asyncio.ensure_future(scheduler.ask("stability", query, ONE, gone))
-        while not any(job.worker for job in scheduler._under_way.values()):
+        first = asyncio.ensure_future(scheduler.ask("stability", query, ONE, disconnected))
+        while not any(job.worker for job in scheduler._running.values()):
             await asyncio.sleep(0.05)
         leaves.set()
         assert (await first).status == 499
@@ -261,9 +263,9 @@ def worker(compute):
 
 
 def test_a_worker_ends_computations_by_the_processor_and_by_the_clock(worker):
-    assert worker.put(object(), "map", does("loop"), Limits(0.2, 60.0)) is Ended.TOO_LONG
+    assert worker.put(object(), "map", does("loop"), Limits(0.2, 60.0)) is NoAnswer.TOO_LONG
     began, process = time.monotonic(), worker.pid
-    assert worker.put(object(), "map", does("nap", seconds=60), Limits(60.0, 0.2)) is Ended.BUSY
+    assert worker.put(object(), "map", does("nap", seconds=60), Limits(60.0, 0.2)) is NoAnswer.BUSY
     assert time.monotonic() - began < 5.0
     # The same process goes on.
     assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] == process
@@ -271,13 +273,13 @@ def test_a_worker_ends_computations_by_the_processor_and_by_the_clock(worker):
 
 def test_a_computation_that_cannot_be_interrupted_costs_the_process(worker):
     process = said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"]
-    assert worker.put(object(), "map", does("hold on"), Limits(0.1, 0.2)) is Ended.TOO_LONG
+    assert worker.put(object(), "map", does("hold on"), Limits(0.1, 0.2)) is NoAnswer.TOO_LONG
     assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] != process
 
 
 def test_an_interrupt_that_compiled_code_turns_into_another_error_is_still_one(worker):
     process = said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"]
-    assert worker.put(object(), "map", does("other error"), Limits(0.1, 10.0)) is Ended.TOO_LONG
+    assert worker.put(object(), "map", does("other error"), Limits(0.1, 10.0)) is NoAnswer.TOO_LONG
     assert said(worker.put(object(), "map", does("tell"), Limits(1.0, 10.0)))["process"] == process
 
 
@@ -285,12 +287,12 @@ def test_workers_do_without_what_other_systems_lack(compute, monkeypatch):
     monkeypatch.setenv("WITHOUT_POSIX", "1")
     worker = Worker(nice=5, compute=compute)
     try:
-        assert worker.put(object(), "map", does("loop"), Limits(0.1, 60.0)) is Ended.TOO_LONG
+        assert worker.put(object(), "map", does("loop"), Limits(0.1, 60.0)) is NoAnswer.TOO_LONG
         assert said(worker.put(object(), "map", does("nap", seconds=0), Limits(1.0, 10.0))) == "done"
     finally:
         worker.close()
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
-    assert scheduling.lanes()["quick"].workers >= 2
+    assert scheduling.pool_settings()["quick"].workers >= 2
 
 
 def test_linear_algebra_has_one_thread_in_workers_whatever_the_environment_says(worker, monkeypatch):
@@ -304,7 +306,7 @@ def test_there_are_as_many_quick_workers_as_the_process_may_use_processors(monke
     counts = {}
     for processors in (1, 3, 64):
         monkeypatch.setattr(os, "sched_getaffinity", lambda pid, n=processors: set(range(n)))
-        counts[processors] = scheduling.lanes()["quick"].workers
+        counts[processors] = scheduling.pool_settings()["quick"].workers
     assert counts == {1: 2, 3: 3, 64: 4}
 
 

@@ -23,7 +23,7 @@ import chuteflow
 from chuteflow.cli.program import main
 from chuteflow.errors import InputError
 from chuteflow.explorer import answers, contents, domains, growth, queries, sentences
-from chuteflow.explorer.server import PAGE, application, bound, host_of
+from chuteflow.explorer.server import PAGE, application, bind_socket, host_of
 from chuteflow.stability.modes import Disturbances
 from chuteflow.steady.chute import SURFACES
 from chuteflow.theory.laws import LAWS
@@ -193,10 +193,12 @@ def test_a_column_is_looked_at_closely_near_the_stops_of_those_beside_it(monkeyp
     monkeypatch.setattr(domains, "summarise", summary)
     query = {"e": "0.8", "ew": "0.8", "x": "slope", "y": "roughness", "place": "0.4"}
     low, high = queries.CONTROLS["roughness"].low, queries.CONTROLS["roughness"].high
-    near = ",".join(f"{low + share * (high - low):.4g}" for share in band)
+    near = ",".join(f"{low + fraction * (high - low):.4g}" for fraction in band)
     known = [domains.map_column(queries.map_column(query | more)).parts["most"] for more in ({}, {"near": near})]
     assert [part.values for part in known] == [(0,), (0, 1, 0)]
-    assert known[1].stops == pytest.approx([low + share * (high - low) for share in band], abs=0.01 * (high - low))
+    assert known[1].stops == pytest.approx(
+        [low + fraction * (high - low) for fraction in band], abs=0.01 * (high - low)
+    )
 
 
 @pytest.mark.parametrize(
@@ -253,9 +255,9 @@ def test_the_words_on_stability(monkeypatch, direction, kx, ky, grows, said):
     found = SimpleNamespace(stable=not grows, mode=mode, searched=(1e-3, 10.0))
     monkeypatch.setattr(growth, "stability_of", lambda flow: found)
     chute = chuteflow.Chute(0.3, 0.8, 0.8, 0.6)
-    verdict = growth.verdict(chuteflow.flows(chute, Q=3.0)[0])
-    assert sentences.of_stability(verdict, chute, None) == said
-    assert sentences.of_waves(verdict, chute, None) == "waves of 0.63 d to 6300 d searched"
+    known = growth.examine_stability(chuteflow.flows(chute, Q=3.0)[0])
+    assert sentences.of_stability(known, chute, None) == said
+    assert sentences.of_waves(known, chute, None) == "waves of 0.63 d to 6300 d searched"
 
 
 def test_stability_that_cannot_be_posed_is_not_known(client):
@@ -381,9 +383,9 @@ def test_a_port_in_use_is_said():
         taken.listen()
         number = taken.getsockname()[1]
         with pytest.raises(InputError, match=f"cannot listen at 127.0.0.1 port {number}: .*--port 0"):
-            bound("127.0.0.1", number)
+            bind_socket("127.0.0.1", number)
     with pytest.raises(InputError, match="not an address of this machine"):
-        bound("no such host", None)
+        bind_socket("no such host", None)
 
 
 @pytest.mark.slow
@@ -427,14 +429,16 @@ def fetched(page, path):
 
 
 def test_stability_is_of_the_flow_of_the_curve_that_was_asked_for(monkeypatch):
-    judged = []
-    monkeypatch.setattr(growth, "verdict", lambda flow: judged.append(flow) or growth.Verdict("stable", (2.0, 50.0)))
+    examined = []
+    monkeypatch.setattr(
+        growth, "examine_stability", lambda flow: examined.append(flow) or growth.FlowStability("stable", (2.0, 50.0))
+    )
     query = {"slope": "0.3", "e": "0.8", "ew": "0.8", "roughness": "0.6"}
     branch = json.loads(answers.answer("curve", query).body)["branches"][0]
     given = json.loads(answers.answer("stability", query | {"branch": "0", "point": "40"}).body)
     assert given["says"] == "stable: no wave grows"
-    assert judged[0].mass_flux == pytest.approx(branch["Q"][40], rel=1e-6)
-    assert judged[0].centre_of_mass == pytest.approx(branch["h"][40], rel=1e-6)
+    assert examined[0].mass_flux == pytest.approx(branch["Q"][40], rel=1e-6)
+    assert examined[0].centre_of_mass == pytest.approx(branch["h"][40], rel=1e-6)
     refused = answers.answer("stability", query | {"branch": "0", "point": "90"})
     assert refused.status == 400
     assert b"there are 90, counted from 0" in refused.body

@@ -21,7 +21,7 @@ BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil
 
 @pytest.fixture(scope="module")
 def found():
-    return sampled.sampled(CHUTE, 60, SURFACE_TEMPERATURE, LARGEST_HOLDUP)
+    return sampled.sample_curve(CHUTE, 60, SURFACE_TEMPERATURE, LARGEST_HOLDUP)
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ def test_what_is_told_of_the_error_is_the_error(found):
     finer = chuteflow.curve(CHUTE, points=178, tolerance=1e-8).branches[0].flows
     # Three times as many intervals: the flows between those kept are at thirds, where the deviation was not looked at.
     thirds = np.arange(1, 177, 3)
-    told = np.exp(sampled.interpolated(one.place, thirds / 3))
+    told = np.exp(sampled.interpolate(one.place, thirds / 3))
     solved = np.array([[getattr(finer[i], name) for name in sampled.PLACE] for i in thirds])
     off = np.abs(told[:, :4] / solved - 1.0).max()
     assert 0.1 * found.deviation.place < off < 1.5 * found.deviation.place
@@ -52,7 +52,7 @@ def test_the_error_grows_where_flows_are_kept_wrong(found):
 def test_a_cubic_is_told_exactly_between_its_rows():
     table = np.arange(8.0)[:, None] ** 3
     at = np.array([0.0, 0.3, 1.5, 4.0, 6.7, 7.0])
-    assert sampled.interpolated(table, at)[:, 0] == pytest.approx(at**3)
+    assert sampled.interpolate(table, at)[:, 0] == pytest.approx(at**3)
 
 
 def test_the_script_has_all_modules_and_no_import(monkeypatch):
@@ -74,11 +74,12 @@ def test_one_file_that_loads_nothing(tmp_path, monkeypatch, capsys):
     page = path.read_text()
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
     assert "default-src 'none'" in page
-    data = re.search(r'<script type="application/json" id="kept">(.*?)</script>', page)
+    data = re.search(r'<script type="application/json" id="standalone-data">(.*?)</script>', page)
     assert data is not None
     kept = json.loads(data[1])
     assert kept["about"]["presets"][0]["state"] == {
-        "slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun", "Q": 4.0, "judge": ""
+        "slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6, "surface": "free", "closure": "lun", "Q": 4.0,
+        "stability": "",
     }  # fmt: skip
     assert "searched: T_surface from 0.001 to 1e+05, M up to 30" in " ".join(kept["says"])
     assert list(kept["about"]["controls"]) == ["Q"]
@@ -98,10 +99,10 @@ def test_the_range_is_narrowed_and_said(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_page_that_grows_too_large_has_fewer_flows(monkeypatch):
     asked = []
-    original = standalone.sampled
+    original = standalone.sample_curve
     monkeypatch.setattr(standalone, "_POINTS", (60, 30))
     monkeypatch.setattr(
-        standalone, "sampled", lambda chute, points, *a: asked.append(points) or original(chute, points, *a)
+        standalone, "sample_curve", lambda chute, points, *a: asked.append(points) or original(chute, points, *a)
     )
     whole = len(standalone.standalone(CHUTE, 3.0))
     monkeypatch.setattr(standalone, "_LARGEST", whole - 1)
@@ -171,7 +172,7 @@ def test_the_page_shows_the_flows_of_the_library(surface, tmp_path):
     path = tmp_path / "page.html"
     assert main(["explore", *PAPER.split(), "--surface", surface, "--export", str(path)]) == 0
     assert path.stat().st_size < 2_000_000
-    kept = json.loads(re.search(r'id="kept">(.*?)</script>', path.read_text())[1])  # pyright: ignore[reportOptionalSubscript]
+    kept = json.loads(re.search(r'id="standalone-data">(.*?)</script>', path.read_text())[1])  # pyright: ignore[reportOptionalSubscript]
     worst = kept["error"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])

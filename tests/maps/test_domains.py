@@ -334,7 +334,7 @@ def test_a_grid_for_many_bases_shows_the_flows_that_a_grid_for_one_shows(surface
     )
     for u, v in np.random.default_rng(3).uniform(size=(6, 2)):
         grid = integrate_trajectories(model(plane.chute_at(u, v)), 1e-3, 1e5, 30.0)
-        alone = classify_flows(grid, bound_extremes(grid), ())
+        alone = classify_flows(grid, bound_extremes(grid), (), plane.within)
         assert classify(plane, u, v)[:2] == (alone.most, alone.families)
 
 

@@ -180,6 +180,11 @@ def test_all_ticks_are_in_one_typeface(window, tmp_path):
     assert faces == {"STIXGeneral"}
 
 
+def test_a_small_number_in_a_formula_has_its_power_raised():
+    assert style.in_formula("1.2726e-05") == r"1.2726\times10^{-5}"
+    assert style.in_formula("0.3") == "0.3"
+
+
 def test_numbers_on_logarithmic_axes_are_plain_where_none_is_large():
     for window, wanted in (((0.2, 300.0), "10"), ((2.0, 3e6), r"$\mathdefault{10^{5}}$")):
         figure, (ax,) = style.panels(1)

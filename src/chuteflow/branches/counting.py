@@ -9,13 +9,16 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow.branches.lines import SteadyBranch
-from chuteflow.branches.ranges import BranchEnd, SearchRange
+from chuteflow.branches.paths import locate_turning_points
+from chuteflow.branches.ranges import BranchEnd
 from chuteflow.branches.results import Branch, Curve
-from chuteflow.branches.solution_branches import trace_all
+from chuteflow.branches.solution_branches import SolutionBranch
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.steady.collocation import LOG_Q
-from chuteflow.steady.model import Model
+
+#: A branch is solved so far beyond rough flows beside turns, along it.
+_BEYOND = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,22 +64,17 @@ def most_at_once(stretches: Array, apart: float = 0.0) -> int:
     return int(np.cumsum(np.repeat([1, -1], len(low))[order]).max(initial=0))
 
 
-def most_solved(problem: Model, within: SearchRange, tolerance: float) -> int | None:
-    """The largest number of flows in a range that share one mass flux, by branches solved from end to end; None where
-    one of them could not be followed."""
+def solve_turns(branch: SolutionBranch, first: int, last: int, tolerance: float) -> Array | None:
+    """ln Q at the turns of the flux between two rough flows of a branch and a little beyond, by solving it there; None
+    where it could not be followed."""
+    length = branch.arclength
+    begin = max(int(np.searchsorted(length, length[first] - _BEYOND)) - 1, 0)
+    end = min(int(np.searchsorted(length, length[last] + _BEYOND)), len(length) - 1)
     try:
-        branches, lost = trace_all(problem, within, tolerance)
-        stops = [
-            [branch.macroscopic[0, LOG_Q], *(turn.point.m[LOG_Q] for turn in turning), branch.macroscopic[-1, LOG_Q]]
-            for branch in branches
-            for turning in [branch.turns(LOG_Q, tolerance)]
-        ]
+        turns = locate_turning_points(branch.solved_between(begin, end, tolerance), LOG_Q, tolerance)
     except SolveError:
         return None
-    if lost or any(BranchEnd.LOST in branch.ends for branch in branches):
-        return None
-    stretches = [sorted(pair) for along in stops for pair in pairwise(along)]
-    return most_at_once(np.array(stretches)) if stretches else 0
+    return np.array([turn.point.m[LOG_Q] for turn in turns])
 
 
 def _monotonic(branch: SteadyBranch) -> list[tuple[float, float]]:

@@ -148,13 +148,15 @@ def solve_within(chute: Chute, which: int, value: float, tolerance: float, withi
 @dataclass(frozen=True, eq=False)
 class _BranchSearch:
     """The branches in a range, the flows among them that meet a condition, and those found just ``beyond`` it; the
-    rough quantities of flows that were seen and not solved, and the ``grid`` of the search."""
+    rough quantities of flows that were seen and not solved, and of places that could not be solved to tell; and the
+    ``grid`` of the search."""
 
     within: SearchRange
     branches: tuple[SolutionBranch, ...]
     solutions: list[Solution]
     beyond: list[Solution]
     lost: list[Array]
+    unsure: list[Array]
     grid: TrajectoryGrid
 
 
@@ -180,13 +182,15 @@ def _search(problem: Model, which: int, value: float, tolerance: float, within: 
     found = find_branches(problem, within)
     solutions: list[Solution] = []
     lost: list[Array] = []
+    unsure: list[Array] = []
     for branch in found:
-        solved, missed = solve_crossings(branch, which, value, tolerance)
+        solved, missed, untold = solve_crossings(branch, which, value, tolerance)
         solutions += solved
         lost += missed
+        unsure += untold
     inside = _distinct([s for s in solutions if within.contains(s.macroscopic)], which)
     beyond = [s for s in solutions if not within.contains(s.macroscopic)]
-    return _BranchSearch(within, found, inside, beyond, lost, search_range(problem, within))
+    return _BranchSearch(within, found, inside, beyond, lost, unsure, search_range(problem, within))
 
 
 def check_condition(given: Mapping[str, Any]) -> tuple[int, float]:
@@ -230,7 +234,7 @@ def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapo
 
 def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
-    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value)
+    left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value, found.unsure)
     if left is not None:
         return left
     for lead in _leads(found, which, value):

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, overload
 
 import numpy as np
 
 from chuteflow.branches.results import Branch
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.kinds import INVERTED, MONOTONIC
-from chuteflow.steady.mapped.curve import MappedCurve
-from chuteflow.steady.mapped.solution import MappedSolution
+
+if TYPE_CHECKING:
+    from chuteflow.steady.mapped.curve import MappedCurve
+    from chuteflow.steady.mapped.solution import MappedSolution
 
 #: Flows and branches by either method, which name their numbers alike.
-SteadyFlow = Flow | MappedSolution
-SteadyBranch = Branch | MappedCurve
+SteadyFlow: TypeAlias = "Flow | MappedSolution"
+SteadyBranch: TypeAlias = "Branch | MappedCurve"
 
 #: The numbers in which a branch is one smooth line, and places on it between two flows that are drawn.
 NUMBERS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")
 _BETWEEN = 10
 
-F = TypeVar("F", bound=SteadyFlow, covariant=True)
+F = TypeVar("F", bound="SteadyFlow", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,9 @@ _OPPOSED = 1.6
 #: Points are not brought closer than this, nor more put between two; where they do not suffice then, the branch is
 #: lost.
 _CLOSEST, _MOST_BETWEEN = 1e-9, 200
+#: Steps of a continuation from one point to another: the first, and the longest, as far as the branch bends; how many
+#: at most; and how much longer the way may be than the chord, and in all.
+_FIRST_STEP, _LONGEST, _MOST_STEPS, _DETOUR, _WAY = 2e-3, 0.1, 120, 4.0, 0.5
 #: A slope along the branch is known between two points to this fraction of what it changes, before points between them
 #: have shown better, which is trusted down to the second; below the third a change of sign is a single one.
 _UNKNOWN, _SUREST, _KNOWN = 0.5, 1e-3, 0.1
@@ -151,25 +154,62 @@ class Chord:
 def refine_path(points: Sequence[PathPoint], tolerance: float = TOLERANCE) -> list[PathPoint]:
     """The points with as many between them as it takes for each chord to suffice.
 
+    Where two points do not join by points between them, the branch is followed from the first. The tangent of a point
+    may come out reversed: near a fold a plane meets the branch on both sides of it.
+
     Raises:
         SolveError: where the branch could not be followed from one to the next.
     """
     out = [points[0]]
     for last in points[1:]:
-        waiting = [last]
-        for _ in range(_MOST_BETWEEN):
-            if not waiting:
-                break
-            chord = Chord(out[-1], waiting[-1], tolerance)
-            if chord.suffices:
-                out.append(waiting.pop())
-                continue
-            if chord.length < _CLOSEST:
-                break
-            waiting.append(_halfway(chord))
-        if waiting:
-            raise SolveError("a branch of flows could not be followed: its points do not join")
+        try:
+            out += _divided(out[-1], last, tolerance)
+        except SolveError:
+            out += _followed(out[-1], last, tolerance)
     return out
+
+
+def _divided(first: PathPoint, last: PathPoint, tolerance: float) -> list[PathPoint]:
+    """The points after ``first`` to ``last``, by halving chords that do not suffice."""
+    out, waiting = [first], [last]
+    for _ in range(_MOST_BETWEEN):
+        if not waiting:
+            return out[1:]
+        chord = Chord(out[-1], waiting[-1], tolerance)
+        if chord.suffices:
+            out.append(waiting.pop())
+            continue
+        if chord.length < _CLOSEST:
+            break
+        waiting.append(_halfway(chord))
+    raise SolveError("a branch of flows could not be followed: its points do not join")
+
+
+def _followed(first: PathPoint, last: PathPoint, tolerance: float) -> list[PathPoint]:
+    """The points after ``first`` to ``last``, by continuation along the branch; the tangent of ``last`` is reversed
+    where the branch passes it the other way."""
+    out = [first]
+    step, way = _FIRST_STEP, 0.0
+    longest = _DETOUR * float(np.linalg.norm(last.m - first.m)) + _WAY
+    for _ in range(_MOST_STEPS):
+        here = out[-1]
+        for end in (last, last.reversed()):
+            if Chord(here, end, tolerance).suffices:
+                return [*out[1:], end]
+        # On new elements: those of a solution are finer than those that Newton's method started from.
+        start = between(here.solution, here.solution, 0.0)
+        point = solve_point(start, here.tangent, float(here.tangent @ here.m) + step, tolerance)
+        if point is None or not Chord(here, point, tolerance).suffices:
+            step *= 0.5
+            if step < _CLOSEST:
+                break
+            continue
+        out.append(point)
+        way += float(np.linalg.norm(point.m - here.m))
+        if way > longest:
+            break
+        step = min(1.5 * step, _LONGEST)
+    raise SolveError("a branch of flows could not be followed: its points do not join")
 
 
 def _halfway(chord: Chord) -> PathPoint:

@@ -68,7 +68,8 @@ class FlowSet(Result, Sequence[Flow]):
             ]
             for i, flow in enumerate(self, 1)
         ]
-        return display.html_table(f"{display.counted(len(self), 'flow')} on {self.chute}", header, rows, self.reason)
+        caption = f"{display.counted(len(self), 'flow')} on {self.chute.summary}"
+        return display.html_table(caption, header, rows, _advice(self.reason))
 
     def __len__(self) -> int:
         return len(self.flows)
@@ -238,7 +239,12 @@ class Curve(Result):
         header = ["branch", "", *(NUMBERS[name].symbol for name in PLACE)]
         rows = [[str(i), *row] for i, branch in enumerate(self.branches, 1) for row in _stations(branch)]
         branches = display.counted(len(self.branches), "branch", "branches")
-        return display.html_table(f"{branches} of flows on {self.chute}", header, rows, self.reason)
+        return display.html_table(f"{branches} of flows on {self.chute.summary}", header, rows, _advice(self.reason))
+
+
+def _advice(reason: str | None) -> str | None:
+    """Why there is no flow, and what tells where there is one."""
+    return None if reason is None else f"No flow: {reason}. chuteflow.nearest says what is nearest that has one."
 
 
 def _place(flow: Flow) -> list[str]:

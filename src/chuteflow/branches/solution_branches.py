@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -67,6 +68,8 @@ _AT_EDGE = 1e-6
 _HIDDEN = 0.05
 #: Points that differ by less are one.
 _SAME = 1e-8
+#: A point is on a branch that passes it so closely, between points or so far beyond them, in parts of their distance.
+_ONE, _BEYOND = 1e-6, 0.01
 #: A logarithm that differs by less is at its value.
 _ROUNDING = 1e-14
 #: Searches whose result is remembered.
@@ -188,6 +191,17 @@ class SolutionBranch:
             inner.pop()
         return refine_path([first, *inner, last], tolerance)
 
+    def solved_between(self, begin: int, end: int, tolerance: float) -> list[PathPoint]:
+        """Points from about rough flow ``begin`` to ``end``, as many as it takes to know the branch between them.
+
+        Raises:
+            SolveError: where the branch could not be followed.
+        """
+        found = self._solved_near(self._spaced(begin, end), tolerance)
+        if len(found) < 2:
+            raise SolveError("a branch seen in the search could not be solved: ask for a larger tolerance")
+        return refine_path(found, tolerance)
+
     def traced(self, tolerance: float) -> list[TracedBranch]:
         """The branch in the range solved from end to end: in one piece, or in several where it is lost in between."""
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
@@ -199,9 +213,9 @@ class SolutionBranch:
                 found.pop()
             found = [*found, found[0]] if len(found) > 2 else []
         pieces: list[list[PathPoint]] = [found[:1]]
-        for one, other in pairwise(found):
+        for other in found[1:]:
             try:
-                pieces[-1] += refine_path([one, other], tolerance)[1:]
+                pieces[-1] += refine_path([pieces[-1][-1], other], tolerance)[1:]
             except SolveError:
                 pieces.append([other])
         ends: list[str] = [BranchEnd.LOST] * (2 * len(pieces))
@@ -278,10 +292,12 @@ def explain_incompleteness(
     names: tuple[str, str],
     which: int = 0,
     value: float | None = None,
+    unsure: Sequence[Array] = (),
 ) -> str | None:
     """What the search leaves open in the range, in words: what was seen and not solved, with rough quantities ``lost``
     and the ``names`` of one and of several; depths not reached; cells that may hide flows, where a value is given
-    only those near it."""
+    only those near it; branches that come as near to the value as they are known, and could not be solved there, with
+    rough quantities ``unsure``."""
     if lost:
         one, several = names
         many = f"{len(lost)} {several} were" if len(lost) > 1 else f"{one} was"
@@ -291,7 +307,9 @@ def explain_incompleteness(
     hidden = [m for m in grid.hidden if within.contains(m) and np.isfinite(m).all()]
     if value is not None:
         hidden = [m for m in hidden if abs(m[which] - np.log(value)) < _HIDDEN]
-    return f"the search does not tell flows apart near {_place(hidden[0])}" if hidden else None
+    if hidden:
+        return f"the search does not tell flows apart near {_place(hidden[0])}"
+    return f"a branch could not be followed near {_place(unsure[0])}, where it may have some" if unsure else None
 
 
 def _place(macroscopic: Array) -> str:
@@ -301,9 +319,10 @@ def _place(macroscopic: Array) -> str:
 
 def solve_crossings(
     branch: SolutionBranch, which: int, value: float, tolerance: float = TOLERANCE
-) -> tuple[list[Solution], list[Array]]:
-    """The flows of a branch at which the quantity ``which`` equals ``value``; and the rough quantities (4,) of those
-    that were seen and could not be solved."""
+) -> tuple[list[Solution], list[Array], list[Array]]:
+    """The flows of a branch at which the quantity ``which`` equals ``value``; the rough quantities (4,) of those that
+    were seen and could not be solved; and those of places that come near to the value where the branch could not be
+    solved to tell."""
     target = float(np.log(value))
     m = branch.macroscopic
     off = m[:, which] - target
@@ -320,15 +339,17 @@ def solve_crossings(
             crossed.append((place, piece))
     found: list[Solution] = []
     lost: list[Array] = []
+    unsure: list[Array] = []
     for begin, end in _runs(near, branch.arclength):
         single = _solve_single(branch, which, target, off, begin, end, tolerance)
         solved = [single] if single is not None else _solve_among(branch, which, target, begin, end, tolerance)
         if solved is None:
             if branch.separate:
                 lost += [m[i] for i in changes.tolist() if begin <= i < end]
+                unsure.append(m[begin + int(np.abs(off[begin : end + 1]).argmin())])
             lost += [piece[len(piece) // 2] for place, piece in crossed if begin <= place <= end]
         found += solved or []
-    return found, lost
+    return found, lost, unsure
 
 
 def _doubt_of(off: Array, arclength: Array) -> Array:
@@ -526,6 +547,18 @@ class TracedBranch:
         """The points at which a quantity turns."""
         return locate_turning_points(self.points, which, tolerance)
 
+    def passes(self, piece: TracedBranch, tolerance: float) -> bool:
+        """Whether the middle point of a short piece lies on the branch."""
+        m = piece.points[len(piece.points) // 2].m
+        for first, last in pairwise(self.points):
+            chord = Chord(first, last, tolerance)
+            sigma = chord.place(m)
+            if -_BEYOND < sigma < 1.0 + _BEYOND and np.linalg.norm(chord.first.m - m) < 2.0 * chord.length:
+                point = chord.at(sigma)
+                if point is not None and np.linalg.norm(point.m - m) < _ONE:
+                    return True
+        return False
+
     def at(self, places: Array, tolerance: float) -> list[PathPoint]:
         """Points at ``places`` of the arclength, or the nearest that are known where there none could be solved."""
         index = np.clip(np.searchsorted(self.arclength, places, side="right") - 1, 0, len(self.points) - 2)
@@ -550,8 +583,11 @@ def trace_all(model: Model, within: SearchRange, tolerance: float) -> tuple[list
     """The same, and rough quantities (4,) on those branches that were seen and could not be solved."""
     found: list[TracedBranch] = []
     lost: list[Array] = []
-    for branch in find_branches(model, within):
+    # Short pieces beside other branches come last: what is traced from them may be a part of these.
+    for branch in sorted(find_branches(model, within), key=lambda branch: not branch.separate):
         pieces = branch.traced(tolerance)
+        if not branch.separate:
+            pieces = [piece for piece in pieces if not any(other.passes(piece, tolerance) for other in found)]
         found += pieces
         inside = [m for m in branch.macroscopic if within.contains(m)]
         if len(inside) > 1 and not pieces and branch.separate:

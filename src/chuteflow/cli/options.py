@@ -179,6 +179,8 @@ def _described(command: Command) -> Command:
 
 def _filled(given: dict[str, Any]) -> dict[str, Any]:
     found = _case(given["chute_file"], given["case"])
+    if isinstance(given["angle"], tuple):
+        given = _with_slopes(given)
     given["grains"] = {}
     if found is None:
         return given
@@ -190,6 +192,19 @@ def _filled(given: dict[str, Any]) -> dict[str, Any]:
         given[name] = values[name]
     given["grains"] = {name: known.value for name, known in found.grains.items()}
     return given
+
+
+def _with_slopes(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with a range of slopes in the place of one of angles, where it was typed."""
+    from chuteflow.steady.chute import slope_of
+
+    low, high = given["angle"]
+    if given["slope"] is not None:
+        raise InputError(f"--slope and --angle {low:g}:{high:g}: give one of them, not both")
+    _require_degrees(low)
+    ends = slope_of(low), slope_of(high)
+    places = {"angle": "slope", "slope": "angle"}
+    return {places.get(name, name): ends if name == "angle" else value for name, value in given.items()}
 
 
 def _case(path: str | None, name: str | None) -> Case | None:
@@ -236,11 +251,15 @@ case_options = _options(
         f"Where neither is given, ${CASE_VARIABLE} may name one.",
     ),
 )
-scale_options = _options(
-    click.option("--si", is_flag=True, help="Results in SI units, with the grains of the chute's file or case."),
+#: The grains, with which results take SI units.
+grains_options = _options(
     option("--diameter", metavar="LENGTH", help='Grain diameter, such as 0.001 (m) or "1 mm", for SI units.'),
     option("--density", metavar="DENSITY", help='Grain density, such as 2500 (kg/m^3) or "2.5 g/cm^3".'),
     option("--gravity", metavar="ACCELERATION", help="Gravity; 9.81 m/s^2 by default."),
+)
+scale_options = _options(
+    click.option("--si", is_flag=True, help="Results in SI units, with the grains of the chute's file or case."),
+    grains_options,
 )
 closure_options = _options(
     option(
@@ -272,7 +291,7 @@ def _parameter_options(
     """Options of the parameters, numbers of a ``kind``; ``said`` is what the help says after their descriptions."""
     return _options(
         option("--slope", type=kind, help=f"Slope tan(theta) of the chute; {slope}."),
-        option("--angle", type=Number(), help=f"Inclination theta in degrees{angle}."),
+        option("--angle", type=kind, help=f"Inclination theta in degrees{angle}."),
         *(
             option(*_names(key), type=kind, help=f"{_opening(parameter.description)}{said(parameter)}.")
             for key, parameter in BY_KEY.items()
@@ -292,7 +311,7 @@ chute_options = _options(_described, case_options, parameter_options, _model_opt
 def range_options(slope: str) -> Callable[[Command], Command]:
     """The same where some parameters take a range; ``slope`` says which."""
     parameters = _parameter_options(
-        NumberOrInterval(), f"LO:HI {slope}", ", instead of --slope", lambda _: "; or LO:HI"
+        NumberOrInterval(), f"LO:HI {slope}", ", also LO:HI, instead of --slope", lambda _: "; or LO:HI"
     )
     return _options(_described, case_options, parameters, _model_options, scale_options)
 
@@ -323,14 +342,17 @@ search_options = _options(
     search_range_options,
 )
 quiet_option = click.option("--quiet", is_flag=True, help="No progress and no notes on standard error.")
+flow_option = option(
+    "--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default)."
+)
 
 
-def output_options(saved: Sequence[str] = SAVED, plotted: str = "") -> Callable[[Command], Command]:
-    """Options of the answer, whose files have endings of ``saved``; ``plotted`` says what is drawn."""
+def output_options(saved: Sequence[str] = SAVED, plotted: str | None = "") -> Callable[[Command], Command]:
+    """Options of the answer, whose files have endings of ``saved``; ``plotted`` says what is drawn, None nothing."""
     endings = f"{', '.join(saved[:-1])} or {saved[-1]}" if saved else ""
     return _options(
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object."),
-        plot_options(plotted),
+        *([] if plotted is None else [plot_options(plotted)]),
         *([option("--save", metavar="FILE", help=f"Write everything to FILE: {endings}.")] if saved else []),
         quiet_option,
     )
@@ -468,7 +490,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
     Raises:
         InputError: for scales that are incomplete, no such units or not positive.
     """
-    from chuteflow.steady.cases import GRAINS
+    from chuteflow.steady.quantities import GRAINS
 
     texts = {name: given[name] for name in GRAINS if given[name] is not None}
     if not texts and not given["si"]:
@@ -478,7 +500,7 @@ def scales(given: Mapping[str, Any]) -> Scales | None:
         if name not in texts and name not in known:
             also = "; a --chute file or a --case of `chuteflow cases` may give them too" if given["si"] else ""
             raise InputError(f"SI units need --diameter and --density: --{name} is missing{also}")
-    from chuteflow.io.units import read_si
+    from chuteflow.amounts import read_si
     from chuteflow.steady.quantities import Scales
 
     return Scales(**{**known, **{name: read_si(f"--{name}", text, GRAINS[name]) for name, text in texts.items()}})
@@ -508,7 +530,8 @@ def amount(given: Mapping[str, Any], name: str, quantity: str, slope: float, sca
     Raises:
         InputError: for text that is no amount, or a unit without grains.
     """
-    from chuteflow.io.units import bare, read_amount
+    from chuteflow.amounts import bare
+    from chuteflow.io.units import read_amount
     from chuteflow.steady.quantities import SCALED
 
     text = str(given[name])
@@ -612,12 +635,45 @@ def deliver_without_flow(
     click.echo(contract.text(content) if given["as_json"] else "\n".join(text))
 
 
+def solve_one(
+    given: Mapping[str, Any],
+    chute: Chute,
+    condition: Mapping[str, Any],
+    scales: Scales | None,
+    empty: Mapping[str, Any],
+) -> Flow | None:
+    """The flow that --flow names of those under the condition; None where there is none, once that is printed, see
+    :func:`deliver_without_flow`.
+
+    Raises:
+        InputError: for a number that no flow has.
+    """
+    from chuteflow.branches.enumeration import flows
+
+    found = flows(chute, **condition)
+    if len(found):
+        return chosen(found, given["which"])
+    deliver_without_flow(given, found, condition, scales, empty)
+    return None
+
+
+def saver(result: Any, scales: Scales | None = None) -> Callable[[str], None]:
+    """What writes a result to a path, see :func:`chuteflow.save`."""
+
+    def save(path: str) -> None:
+        from chuteflow.io import files
+
+        files.save(result, path, scales=scales)
+
+    return save
+
+
 def deliver_object(
     given: Mapping[str, Any],
     content: Any,
     report: Iterable[str],
-    rows: Callable[[], Iterable[Sequence[str]]],
-    plot: Callable[[], Figure],
+    rows: Callable[[], Iterable[Sequence[Any]]],
+    plot: Callable[[], Figure] | None,
 ) -> None:
     """Print the object ``content`` with --json, else the lines of ``report``; write it, or ``rows``, to the file that
     --save names; and draw. See :func:`deliver`.
@@ -625,22 +681,21 @@ def deliver_object(
     Raises:
         InputError: once the answer is printed, for files that could not be written.
     """
-    from chuteflow.io import contract
     from chuteflow.io.files import write_answer
 
-    answer = contract.text(content) if given["as_json"] else "\n".join(report)
-    deliver(given, answer, lambda path: write_answer(path, lambda: content, rows), plot)
+    deliver(given, lambda: content, report, lambda path: write_answer(path, lambda: content, rows), plot)
 
 
 def deliver(
     given: Mapping[str, Any],
-    answer: str,
+    content: Callable[[], Any],
+    report: Iterable[str],
     save: Callable[[str], None] | None,
-    plot: Callable[[], Figure],
+    plot: Callable[[], Figure] | None,
     **pictures: Callable[[], Figure],
 ) -> None:
-    """Write the files that --save, where the command has it, --plot and options of ``pictures`` name, and print the
-    answer.
+    """Write the files that --save and --plot, where the command has them, and options of ``pictures`` name, and print
+    the object ``content`` with --json, else the lines of ``report``.
 
     No full disk is to cost the answer.
 
@@ -657,12 +712,17 @@ def deliver(
             for one in picture_files(path):
                 write_figure(drawn, one)
 
+    from chuteflow.io import contract
+
+    answer = contract.text(content()) if given["as_json"] else "\n".join(report)
     failures = []
-    writers = {name: partial(draw, figure) for name, figure in {"plot": plot, **pictures}.items()}
+    if plot is not None:
+        pictures = {"plot": plot, **pictures}
+    writers = {name: partial(draw, figure) for name, figure in pictures.items()}
     if save is not None:
         writers = {"save": save, **writers}
     for name, write in writers.items():
-        if given[name] is not None:
+        if given.get(name) is not None:
             try:
                 write(given[name])
             except InputError as error:
@@ -683,10 +743,10 @@ def require_outputs(given: Mapping[str, Any], saved: Sequence[str] = SAVED) -> N
 
     if given.get("save") is not None:
         require_writable(given["save"], saved)
-    if given["plot"] is not None:
+    if given.get("plot") is not None:
         for path in picture_files(given["plot"]):
             require_writable(path, DRAWN)
-    if given["theme"] is not None:
+    if given.get("theme") is not None:
         from chuteflow.plotting.style import require_theme
 
         require_theme(given["theme"])

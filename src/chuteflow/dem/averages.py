@@ -31,12 +31,12 @@ from chuteflow.dem.script import BIN, MOMENTS
 
 #: Width of the kernel, and the distance of the heights at which fields are given.
 KERNEL, SPACING = 0.25, 0.25
-#: An error that is a smaller share than this is rounding.
+#: An error that is a smaller fraction than this is rounding.
 _ROUNDING = 1e-12
 #: The kernel ends at so many of its widths.
 _CUT = 4.0
-#: Fields are given where this share of the hold-up lies above, at least.
-_SMALLEST_SHARE = 1e-3
+#: Fields are given where this fraction of the hold-up lies above, at least.
+_SMALLEST_FRACTION = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,22 +222,22 @@ def _contacts(
     is_base = np.ones(len(upper), dtype=bool) if lower is None else frame.is_bump[lower]
     damping = np.where(is_base, law.damping(law.wall_restitution, MASS), law.damping(law.restitution, PAIR_MASS))
     relative = velocity - below
-    parting = np.einsum("ij,ij->i", relative, normal)
-    press = law.stiffness * overlap - damping * parting
-    force = press[:, None] * normal
-    loss = damping * parting**2
+    separation_speed = np.einsum("ij,ij->i", relative, normal)
+    normal_force = law.stiffness * overlap - damping * separation_speed
+    force = normal_force[:, None] * normal
+    loss = damping * separation_speed**2
     if law.friction > 0.0 and frame.spin is not None:
-        slide = relative - parting[:, None] * normal
+        slip = relative - separation_speed[:, None] * normal
         turning = arms[1][:, None] * frame.spin[upper]
         if lower is not None and arms[0] is not None:
             turning += arms[0][:, None] * frame.spin[lower]
-        slide -= np.cross(turning, normal)
-        speed = np.sqrt(np.einsum("ij,ij->i", slide, slide))
-        share = np.where(is_base, law.tangential_share(law.wall_restitution), law.tangential_share(law.restitution))
+        slip -= np.cross(turning, normal)
+        speed = np.sqrt(np.einsum("ij,ij->i", slip, slip))
+        ratio = np.where(is_base, law.tangential_ratio(law.wall_restitution), law.tangential_ratio(law.restitution))
         # The limit is mu times the elastic and damped parts, as in LAMMPS.
-        limit = law.friction * np.abs(press)
-        wall_shear = np.minimum(share * damping * speed, limit)
-        force = force - np.where(speed > 0.0, wall_shear / np.maximum(speed, 1e-300), 0.0)[:, None] * slide
+        limit = law.friction * np.abs(normal_force)
+        wall_shear = np.minimum(ratio * damping * speed, limit)
+        force = force - np.where(speed > 0.0, wall_shear / np.maximum(speed, 1e-300), 0.0)[:, None] * slip
         loss = loss + wall_shear * speed
     height = frame.position[upper, 2]
     return Contact(
@@ -252,16 +252,18 @@ def _contacts(
     )
 
 
-#: Where the numbers of the base are extrapolated from: straight lines in the overburden over these shares of M.
+#: Where the numbers of the base are extrapolated from: straight lines in the overburden over these fractions of M.
 BULK = (0.5, 0.9)
 
 
 def heights_of(sums: Sums, kernel: float) -> Array:
     """Heights (m,) at which fields are given: up to where a thousandth of the hold-up lies above."""
     mass = sums.mean().mass[0]
-    share = np.cumsum(mass[::-1])[::-1] / mass.sum()
+    fraction = np.cumsum(mass[::-1])[::-1] / mass.sum()
     # The last bin has all that is higher.
-    top = min(int(np.count_nonzero(share > _SMALLEST_SHARE)), len(mass) - 1 - math.ceil(_CUT * kernel / BIN)) * BIN
+    top = (
+        min(int(np.count_nonzero(fraction > _SMALLEST_FRACTION)), len(mass) - 1 - math.ceil(_CUT * kernel / BIN)) * BIN
+    )
     return np.arange(SPACING, max(top, 2.0 * SPACING) + 1e-9, SPACING)
 
 
@@ -337,14 +339,14 @@ def numbers_of(sums: Sums, found: dict[str, Array], scene: Scene) -> dict[str, f
     mass, moment = sums.mass[0], dict(zip(MOMENTS, sums.moments[0].T, strict=True))
     M = float(mass.sum())
     Q = float(moment["vx"].sum())
-    share = found["overburden"] / M
+    fraction = found["overburden"] / M
     good = np.isfinite(found["granular_temperature"])
-    bulk = good & (share >= BULK[0]) & (share <= BULK[1])
+    bulk = good & (fraction >= BULK[0]) & (fraction <= BULK[1])
 
     def at_base(name: str) -> float:
         if np.count_nonzero(bulk) < 3:
             return math.nan
-        return float(np.polyval(np.polyfit(share[bulk], found[name][bulk], 1), 1.0))
+        return float(np.polyval(np.polyfit(fraction[bulk], found[name][bulk], 1), 1.0))
 
     slip, base_T = at_base("velocity"), at_base("granular_temperature")
     traction = scene.chute.slope * M
@@ -388,13 +390,15 @@ _TENTHS = (
 _WITHIN = (np.arange(8) + 0.5) / 80.0
 
 
-def at_shares(height: Array, found: Mapping[str, Array], holdup: float, names: Iterable[str], share: Array) -> Array:
-    """Fields, one row each, where ``share`` (k,) of the hold-up lies above, linear between the heights; NaN outside."""
+def fields_at_overburden(
+    height: Array, found: Mapping[str, Array], holdup: float, names: Iterable[str], fraction: Array
+) -> Array:
+    """Fields, one row each, where ``fraction`` (k,) of the hold-up lies above, linear between heights; NaN outside."""
     known = found["overburden"] / holdup
     good = np.isfinite(found["granular_temperature"]) & np.isfinite(known)
     x = known[good][::-1]
     columns = {"height": height, **found}
-    return np.array([np.interp(share, x, columns[name][good][::-1], left=np.nan, right=np.nan) for name in names])
+    return np.array([np.interp(fraction, x, columns[name][good][::-1], left=np.nan, right=np.nan) for name in names])
 
 
 def tenths_of(height: Array, found: Mapping[str, Array], holdup: float) -> dict[str, Array]:
@@ -404,10 +408,14 @@ def tenths_of(height: Array, found: Mapping[str, Array], holdup: float) -> dict[
     """
     names = [name for name in _TENTHS if name in found]
     edges = np.append(np.arange(1, 10), 9.99) / 10.0
-    z, u = at_shares(height, found, holdup, ("height", "velocity"), edges)
-    share = (np.arange(1, 10) / 10.0)[:, None] + _WITHIN
+    z, u = fields_at_overburden(height, found, holdup, ("height", "velocity"), edges)
+    fraction = (np.arange(1, 10) / 10.0)[:, None] + _WITHIN
     inner = dict(
-        zip(names, at_shares(height, found, holdup, names, share.ravel()).reshape(-1, *share.shape), strict=True)
+        zip(
+            names,
+            fields_at_overburden(height, found, holdup, names, fraction.ravel()).reshape(-1, *fraction.shape),
+            strict=True,
+        )
     )
     # dz = -dp/nu
     weight = 1.0 / inner["volume_fraction"]

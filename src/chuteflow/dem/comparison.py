@@ -1,8 +1,8 @@
-"""The theory beside a measured flow: its flows at the same hold-up and flux, and its functions at the measured state.
+"""A measured flow compared with the theory: with flows at the same hold-up or flux, and with functions of laws.
 
-# notation: nu, T, u as everywhere; p/M share of the hold-up above; g1, g2, g5 of (2.7); F1 = u_b/sqrt(T_b) of (3.15).
+# notation: nu, T, u as everywhere; p/M fraction of the hold-up above; g1, g2, g5 of (2.7); F1 = u_b/sqrt(T_b), (3.15).
 
-Profiles are compared at equal shares of the overburden, so that no height of the base has to be agreed on. A measured
+Profiles are compared at equal fractions of the overburden, so that no height of the base has to be chosen. A measured
 function is compared with that of a law at the measured volume fraction and temperature, averaged in the same way.
 """
 
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chuteflow.branches.enumeration import flows
-from chuteflow.dem.averages import at_shares
+from chuteflow.dem.averages import fields_at_overburden
 from chuteflow.dem.measured import Measured
 from chuteflow.dem.output import Array
 from chuteflow.errors import InputError
@@ -26,9 +26,9 @@ from chuteflow.theory.laws import law
 
 #: Tenths of the overburden that are compared: p/M from 0.1 to 0.8. Nearer to the base is the layer that lies on it.
 COMPARED = slice(0, 7)
-_SHARES = (np.arange(1, 10) / 10.0)[COMPARED] + 0.05
+_FRACTIONS = (np.arange(1, 10) / 10.0)[COMPARED] + 0.05
 _WITHIN = (np.arange(8) + 0.5) / 80.0
-#: A difference within so many errors is none; one below this share is small.
+#: A difference within so many errors is none; one below this fraction is small.
 ERRORS, SMALL = 2.0, 0.05
 MAPPINGS = {"area": "roughness_by_area", "spacing": "roughness"}
 _FIELDS = ("volume_fraction", "granular_temperature", "velocity")
@@ -54,7 +54,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Difference:
-    """A measured number beside that of the theory.
+    """A measured number and that of the theory.
 
     ``relative`` is (measured - theory)/theory, ``error`` the standard error of it, NaN where it is not known.
     """
@@ -71,7 +71,7 @@ class Difference:
         return self.relative / self.error if self.error > 0.0 else math.nan
 
     @property
-    def verdict(self) -> str:
+    def agreement(self) -> str:
         """ "agrees" within two errors, "close" within 5 %, "differs", or "unknown"."""
         if not math.isfinite(self.relative):
             return "unknown"
@@ -82,7 +82,7 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A flow of the theory beside the measured one: at the same ``condition``, "M" or "Q"."""
+    """A flow of the theory at the same ``condition`` as the measured one, "M" or "Q"."""
 
     closure: str
     mapping: str
@@ -104,8 +104,7 @@ class Functions:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Everything: the measured flow, the flows of the theory beside it, where there is none with the reason, and the
-    functions of each law."""
+    """The measured flow, the flows of the theory, reasons where there is none, and the functions of each law."""
 
     measured: Measured
     candidates: tuple[Candidate, ...]
@@ -123,7 +122,7 @@ def compare(
     the same ``conditions``, hold-up M or flux Q, and functions.
 
     Raises:
-        InputError: for a closure or mapping that is not known, or a chute that the run does not say.
+        InputError: for a closure or mapping that is not known, or a chute that the run does not define.
     """
     laws = [law(name) for name in closures]
     known = [name for name in mappings if math.isfinite(_roughness(measured, name))]
@@ -172,7 +171,7 @@ def _flow_differences(measured: Measured, flow: Flow, condition: str) -> Iterato
     }
     for name, value in theory.items():
         if name in measured.numbers:
-            # The hold-up is exact; what its difference is worth, the error of the flux would say.
+            # The hold-up has no error; the error of its difference would follow from that of the flux.
             error = math.nan if name == "mass_holdup" else measured.number_errors.get(name, math.nan)
             yield difference(name, measured.numbers[name], value, error)
     within = _points().ravel()
@@ -185,7 +184,7 @@ def _flow_differences(measured: Measured, flow: Flow, condition: str) -> Iterato
 
 
 def _points() -> Array:
-    return (_SHARES - 0.05)[:, None] + _WITHIN
+    return (_FRACTIONS - 0.05)[:, None] + _WITHIN
 
 
 def _profile_difference(measured: Measured, name: str, theory: Array) -> Difference:
@@ -211,7 +210,7 @@ def _functions(measured: Measured, closure: str, chosen: Law, mappings: Sequence
         if name in measured.tenths and name in theory:
             ratios[name] = measured.tenths[name][COMPARED] / theory[name]
             own = measured.tenth_errors.get(name, np.full(9, np.nan))[COMPARED] / theory[name]
-            # What the law says has the error of the volume fraction.
+            # Values of the law have the error of the volume fraction.
             spread = measured.tenth_errors.get("volume_fraction", np.full(9, np.nan))[COMPARED]
             errors[name] = np.hypot(own, ratios[name] * theory[f"{name}_slope"] * spread)
     found = [_mean_ratio(name, ratios[name], errors[name]) for name in ratios]
@@ -235,7 +234,7 @@ def law_values(measured: Measured, chosen: Law) -> dict[str, Array]:
     wanted = ("volume_fraction", "granular_temperature", "temperature_z", "shear_stress")
     names = [name for name in wanted if name in measured.fields]
     points = _points()
-    found = at_shares(measured.height, dict(measured.fields), measured.holdup, names, points.ravel())
+    found = fields_at_overburden(measured.height, dict(measured.fields), measured.holdup, names, points.ravel())
     inner = dict(zip(names, found.reshape(-1, *points.shape), strict=True))
     nu, T = inner["volume_fraction"], inner["granular_temperature"]
     weight = 1.0 / nu
@@ -291,7 +290,7 @@ def _base_differences(measured: Measured, chosen: Law, mappings: Sequence[str]) 
 
 
 def sentences(found: Comparison) -> Iterator[str]:
-    """In words: which law fits best and how well, where the base fits, and which flow of the theory is nearest."""
+    """Sentences: which law fits best and how well, which fits at the base, and which flow of the theory is nearest."""
     for symbol in FUNCTIONS:
         rows = [(one.closure, d) for one in found.functions for d in one.differences if d.name == symbol]
         rows = [(closure, d) for closure, d in rows if math.isfinite(d.relative)]
@@ -299,7 +298,7 @@ def sentences(found: Comparison) -> Iterator[str]:
             closure, best = min(rows, key=lambda row: abs(row[1].relative))
             others = [f"{name} {_percent(d)}" for name, d in rows if name != closure]
             beside = f" (others: {', '.join(others)})" if others else ""
-            yield f"{WORDS[symbol]} {symbol}: {closure} {best.verdict}, {_percent(best)}{beside}"
+            yield f"{WORDS[symbol]} {symbol}: {closure} {best.agreement}, {_percent(best)}{beside}"
     yield from _base_sentences(found)
     at_holdup = [one for one in found.candidates if one.condition == "M"]
     if at_holdup:
@@ -319,7 +318,7 @@ def _base_sentences(found: Comparison) -> Iterator[str]:
         if rows:
             closure, best = min(rows, key=lambda row: abs(row[1].relative))
             by = best.name.split(", ")[1]
-            yield f"{WORDS[kind]}: nearest is {closure} with {by}, {best.verdict}, {_percent(best)}"
+            yield f"{WORDS[kind]}: nearest is {closure} with {by}, {best.agreement}, {_percent(best)}"
 
 
 def _percent(one: Difference) -> str:

@@ -23,7 +23,7 @@ PAIR_MASS = 0.5 * MASS
 FEWEST_STEPS, STEPS_FOR_ENERGY = 30, 0.08
 #: A collision this many times as fast as sqrt(T) is the one whose overlap is bounded.
 FAST = 4.0
-#: Share of critical damping of the tangential dashpot, which friction limits.
+#: Fraction of critical damping of the tangential dashpot, which friction limits.
 TANGENTIAL_RATIO = 0.5
 
 
@@ -35,13 +35,13 @@ def damping_ratio(restitution: float) -> float:
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the stiffness follows from.
+    """Bounds on contacts, which give the stiffness.
 
     Args:
         overlap: largest overlap in grain diameters of a collision with the normal speed 4 sqrt(T).
         contact_share: largest t_c over the mean time between collisions of a grain.
-        restitution: largest error of the restitution in one collision, from which the time step follows. A contact is
-            a step longer or shorter by chance; over many collisions the errors cancel.
+        restitution: largest error of the restitution in one collision, from which the time step follows. The
+            duration of a contact is random by one step; over many collisions the errors cancel.
     """
 
     overlap: float = 0.02
@@ -86,7 +86,7 @@ class Contacts:
         """gamma of the dashpot of a contact with this restitution."""
         return 2.0 * damping_ratio(restitution) * math.sqrt(self.stiffness * effective_mass)
 
-    def tangential_share(self, restitution: float) -> float:
+    def tangential_ratio(self, restitution: float) -> float:
         """The tangential damping over the normal one; 0 without friction."""
         zeta = damping_ratio(restitution)
         return TANGENTIAL_RATIO / zeta if self.friction > 0.0 and zeta > 0.0 else 0.0
@@ -101,7 +101,7 @@ def contacts_for(
     wall_restitution: float,
     friction: float = 0.0,
 ) -> Contacts:
-    """The softest contacts that keep the bounds at a granular temperature and a rate of collisions of a grain."""
+    """The softest contacts within the bounds at a granular temperature and a collision rate of a grain."""
     speed = FAST * math.sqrt(temperature)
     # An undamped contact at speed v overlaps by v t_c/pi.
     shortest = min(bounds.overlap * math.pi / speed, bounds.contact_share / collision_rate)

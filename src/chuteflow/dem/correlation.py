@@ -24,7 +24,7 @@ def long_run_variance(samples: Array, fitted: int = 1) -> Array:
     constants, 1 for a mean and 2 for a straight line, were taken off; NaN where a sample is."""
     count = len(samples)
     covariance = _autocovariance(samples.reshape(count, -1))
-    # An even share of the noise is in every lag; lag 0 counts once, all others twice.
+    # The noise is spread evenly over the lags; lag 0 counts once, all others twice.
     sums = 2.0 * np.cumsum(covariance, axis=0) - covariance[0]
     window = _windows(sums, covariance[0], count)
     found = sums[window, np.arange(sums.shape[1])] * (1.0 + fitted * (2.0 * window + 1.0) / count)

@@ -1,4 +1,4 @@
-"""What a simulation has measured: fields over height and numbers, each with a standard error."""
+"""Measured flows: fields over height and numbers, each with a standard error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from chuteflow.dem.correlation import correlation_time
 from chuteflow.dem.output import Array, Layers, read_frames, read_layers, read_totals
 from chuteflow.dem.run import Run
 from chuteflow.dem.scene import Scene
-from chuteflow.dem.steadiness import Drift, drift, verdict
+from chuteflow.dem.steadiness import Drift, drift, overall_steadiness
 from chuteflow.errors import InputError
 from chuteflow.steady.chute import Chute
 
@@ -49,7 +49,10 @@ NUMBERS = {
     "mass_holdup": ("M", "mass per unit area of the base"),
     "centre_of_mass": ("h", "height of the centre of mass above the bumps' centres"),
     "mean_temperature": ("T_mean", "granular temperature, mean over the grains"),
-    "share_above": ("", "share of the grains above the highest layer: no profile, height or temperature knows of them"),
+    "share_above": (
+        "",
+        "fraction of the grains above the highest layer: they are in no profile, height or temperature",
+    ),
     "slip_velocity": ("u_b", "velocity at the base: a line in p over p/M from 0.5 to 0.9, at p = M"),
     "base_temperature": ("T_b", "granular temperature at the base, by the same line"),
     "base_volume_fraction": ("nu_b", "volume fraction at the base, by the same line"),
@@ -64,9 +67,9 @@ NUMBERS = {
     "contact_share": ("", "mean number of contacts of a grain with others at one moment"),
     "mean_overlap": ("", "mean overlap of contacts"),
 }
-#: What values are, before their names.
+#: Prefixes of the names of values, by kind.
 _FIELD, _NUMBER, _TENTH = "field ", "number ", "tenth "
-#: Numbers whose drift tells whether a run is steady.
+#: Numbers whose drifts decide whether a run is steady.
 _WATCHED = ("mass_flux", "centre_of_mass", "mean_temperature")
 
 
@@ -108,7 +111,7 @@ class Measured:
     @property
     def steadiness(self) -> str:
         """ "steady", "not steady" or "undecided"."""
-        return verdict(dict(self.drifts)) if self.drifts else "undecided"
+        return overall_steadiness(dict(self.drifts)) if self.drifts else "undecided"
 
     @property
     def holdup(self) -> float:
@@ -116,7 +119,7 @@ class Measured:
         return self.numbers["mass_holdup"]
 
     @property
-    def share(self) -> Array:
+    def fraction_above(self) -> Array:
         """p/M at the heights."""
         return self.fields["overburden"] / self.holdup
 
@@ -129,7 +132,7 @@ class Measured:
         given = {"slope": self.slope, "e": self.restitution, "ew": self.wall_restitution, "roughness": roughness}
         missing = [f"--{name}" for name, value in given.items() if not math.isfinite(value)]
         if missing:
-            raise InputError(f"the run does not say {', '.join(missing)}: give what is missing")
+            raise InputError(f"the run does not define {', '.join(missing)}: give what is missing")
         return Chute(self.slope, self.restitution, self.wall_restitution, roughness, closure=closure)
 
 
@@ -152,7 +155,7 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
     sums = averages.sums_of(scene, layers, frames)
     heights = averages.heights_of(sums, kernel)
     values, errors = averages.with_errors(sums, lambda one: _values(one, heights, kernel, scene))
-    drifts, memory = _drifts(run)
+    drifts, correlation = _drifts(run)
     return Measured(
         slope=scene.chute.slope,
         restitution=scene.chute.restitution,
@@ -167,12 +170,12 @@ def measure(run: Run, kernel: float = averages.KERNEL) -> Measured:
         tenths=_part(values, _TENTH),
         tenth_errors=_part(errors, _TENTH),
         drifts=drifts,
-        notes=_notes(run, kernel, count, float(sums.overlap[:, 1].max())) | {"correlation_time": memory},
+        notes=_notes(run, kernel, count, float(sums.overlap[:, 1].max())) | {"correlation_time": correlation},
     )
 
 
 def _values(sums: averages.Sums, heights: Array, kernel: float, scene: Scene) -> dict[str, Any]:
-    """All values that errors are asked for, by what they are and their names."""
+    """All values that have errors, by kind and name."""
     fields = averages.fields_of(sums, heights, kernel)
     numbers = averages.numbers_of(sums, fields, scene)
     tenths = averages.tenths_of(heights, fields, numbers["mass_holdup"])
@@ -185,15 +188,15 @@ def _part(values: Mapping[str, Array], kind: str) -> dict[str, Array]:
 
 
 def _drifts(run: Run) -> tuple[dict[str, Drift], float]:
-    """Drifts by the names of their numbers, and the longest time for which one of these remembers its value."""
+    """Drifts by the names of their numbers, and the longest of their correlation times."""
     steps, totals = read_totals(run.folder / script.TOTALS)
     kept = (steps > run.steps.first) & (steps <= run.steps.last)
     times, totals = steps[kept] * run.steps.step, totals[kept]
     # Fluctuations across the slope and upward have no mean to be taken off.
     series = (totals[:, 0], totals[:, 1], 0.5 * (totals[:, 2] + totals[:, 3]))
     step = float(np.diff(times).mean()) if len(times) > 1 else math.nan
-    memory = max((step * correlation_time(one) for one in series if len(one) > 1), default=math.nan)
-    return {name: drift(times, values) for name, values in zip(_WATCHED, series, strict=True)}, memory
+    correlation = max((step * correlation_time(one) for one in series if len(one) > 1), default=math.nan)
+    return {name: drift(times, values) for name, values in zip(_WATCHED, series, strict=True)}, correlation
 
 
 def _notes(run: Run, kernel: float, blocks: int, largest_overlap: float) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Measured flows as files: NetCDF 4 with CF attributes, and CSV, which other codes can write too.
+"""Files of measured flows: NetCDF 4 with CF attributes, and CSV, which other codes can write too.
 
 A CSV begins with lines "# name = value" for what is one number or text, and then has one row for each height, with the
 names of the columns before them. Needed are slope, e and the columns height, volume_fraction, velocity and
@@ -12,9 +12,9 @@ import csv
 import math
 import os
 from collections.abc import Mapping
-from io import BytesIO, StringIO
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -25,9 +25,10 @@ from chuteflow.dem.measured import FIELDS, NUMBERS, Measured
 from chuteflow.dem.output import Array
 from chuteflow.dem.steadiness import Drift
 from chuteflow.errors import InputError
+from chuteflow.io.csv_file import write_rows
 from chuteflow.io.dataset import Dataset, Variable
 from chuteflow.io.references import PAPER, numbers_are
-from chuteflow.io.writing import require_writable, write_whole
+from chuteflow.io.writing import as_text, write_file
 
 SAVED = (".nc", ".csv")
 #: Parameters by their names in files.
@@ -54,9 +55,7 @@ def save(measured: Measured, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: for another ending, or a file that cannot be written.
     """
-    suffix = require_writable(path, SAVED)
-    content = _netcdf(measured) if suffix == ".nc" else _csv(measured)
-    write_whole(path, content)
+    write_file(path, {".nc": partial(_write_netcdf, measured), ".csv": partial(_write_csv, measured)})
 
 
 def load(path: str | os.PathLike[str]) -> Measured:
@@ -75,13 +74,10 @@ def load(path: str | os.PathLike[str]) -> Measured:
         return _from_netcdf(Path(path)) if suffix == ".nc" else _from_csv(Path(path))
 
 
-def _netcdf(measured: Measured) -> bytes:
-    from chuteflow.io import netcdf_file
+def _write_netcdf(measured: Measured, stream: BinaryIO) -> None:
+    from chuteflow.io.netcdf_file import history, write_groups
 
-    stream = BytesIO()
-    with netcdf_file.create(stream) as file:
-        _dataset(measured, netcdf_file.history()).write(file)
-    return stream.getvalue()
+    write_groups(stream, _dataset(measured, history()))
 
 
 def _dataset(measured: Measured, history: str) -> Dataset:
@@ -98,7 +94,7 @@ def _dataset(measured: Measured, history: str) -> Dataset:
     }
     told = {"units": "1", "long_name": "height above the plane of the bumps' centres", "positive": "up"}
     variables = {"height": Variable(("height",), measured.height, told)}
-    told = {"units": "1", "long_name": "share of the hold-up above, middle of a tenth"}
+    told = {"units": "1", "long_name": "fraction of the hold-up above, middle of a tenth"}
     variables["tenth"] = Variable(("tenth",), np.arange(1, 10) / 10.0 + 0.05, told)
     for name, values in measured.fields.items():
         variables |= _described(name, ("height",), values, measured.errors.get(name), FIELDS[name])
@@ -107,7 +103,7 @@ def _dataset(measured: Measured, history: str) -> Dataset:
     for name, value in measured.numbers.items():
         variables |= _described(name, (), value, measured.number_errors.get(name), NUMBERS[name])
     for name, one in measured.drifts.items():
-        about = ("", f"change of {name} over 300 time units, as a share of its mean")
+        about = ("", f"change of {name} over 300 time units, as a fraction of its mean")
         variables |= _described(f"{_DRIFT}{name}", (), one.value, one.error, about)
     return Dataset(variables, attributes)
 
@@ -166,8 +162,7 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and np.size(value) == 1 else value
 
 
-def _csv(measured: Measured) -> str:
-    out = StringIO()
+def _write_csv(measured: Measured, stream: BinaryIO) -> None:
     heads: dict[str, Any] = {"chuteflow": __version__}
     heads |= {name: getattr(measured, attribute) for name, attribute in _CHUTE.items()}
     for name, value in measured.numbers.items():
@@ -180,17 +175,15 @@ def _csv(measured: Measured) -> str:
         for key, array in ((f"mean_{name}", values), (f"mean_{name}{_ERROR}", errors)):
             heads[key] = " ".join(_cell(value) or "nan" for value in array)
     heads |= measured.notes
-    for name, value in heads.items():
-        out.write(f"# {name} = {_cell(value) if isinstance(value, float) else value}\n")
     columns = {"height": measured.height}
     for name, values in measured.fields.items():
         columns[name] = values
         if name in measured.errors:
             columns[name + _ERROR] = measured.errors[name]
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(value) for value in row] for row in zip(*columns.values(), strict=True))
-    return out.getvalue()
+    with as_text(stream) as file:
+        for name, value in heads.items():
+            file.write(f"# {name} = {_cell(value) if isinstance(value, float) else value}\n")
+        write_rows(file, [list(columns), *([_cell(v) for v in row] for row in zip(*columns.values(), strict=True))])
 
 
 def _cell(value: float) -> str:

@@ -1,4 +1,4 @@
-"""The parameters of a chute from a measured flow: whether grains come back as what they are.
+"""Fits of the parameters of a chute to a measured flow: whether the parameters of its grains are recovered.
 
 Profiles of the volume fraction, the granular temperature and the velocity are fitted where p/M is from 0.1 to 0.9, at
 the measured hold-up, the height of the base unknown. Where the theory does not hold within the statistical errors,
@@ -18,7 +18,7 @@ from chuteflow.errors import InputError
 from chuteflow.fitting.calibration import Fit, fit
 from chuteflow.fitting.measurements import PROFILES, Measurements, measurements
 
-#: Shares of the hold-up above between which profiles are fitted: the layer that lies on the base is not the theory's.
+#: Fractions of the hold-up above between which profiles are fitted: the theory does not describe the layer on the base.
 FITTED = (0.1, 0.9)
 #: Trial chutes that the search starts from, beside the chute of the run.
 _TRIALS = 8
@@ -26,14 +26,14 @@ _TRIALS = 8
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """A fit, and what the statistical errors were multiplied with for it."""
+    """A fit, and the factor by which the statistical errors were multiplied for it."""
 
     fit: Fit
     widening: float
 
 
-def recovered(measured: Measured, closure: str, free: Sequence[str]) -> Recovery:
-    """The parameters ``free`` with which the flow of a law at the measured hold-up is nearest to the measured one.
+def recover(measured: Measured, closure: str, free: Sequence[str]) -> Recovery:
+    """Fit the parameters ``free`` of the flow of a law at the measured hold-up.
 
     Raises:
         InputError: for parameters of the chute that are not known, unknown names, or too few heights.
@@ -59,7 +59,7 @@ def as_measurements(measured: Measured, widening: float = 1.0) -> Measurements:
     """
     names = {symbol: field for symbol, (field, _) in PROFILES.items()}
     low, high = FITTED
-    kept = (measured.share > low) & (measured.share < high)
+    kept = (measured.fraction_above > low) & (measured.fraction_above < high)
     for field in names.values():
         kept &= np.isfinite(measured.fields[field])
     known = all(field in measured.errors and (measured.errors[field][kept] > 0.0).all() for field in names.values())

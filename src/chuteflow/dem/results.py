@@ -1,4 +1,4 @@
-"""Many measured flows together: where the theory holds, and where it does not."""
+"""Tables of many measured flows, each compared with the theory."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _COMPARED = (
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """A measured flow by its name, and the theory beside it at the same hold-up."""
+    """A named measured flow, and its comparison with the theory at the same hold-up."""
 
     name: str
     comparison: Comparison
@@ -49,7 +49,7 @@ class StudyResult:
 
     @property
     def state(self) -> str:
-        """ "at rest" where it comes to rest, "cold" where grains move hardly agitated, else how steady it is."""
+        """ "at rest" where it comes to rest, "cold" where the granular temperature is small, else its steadiness."""
         if self.measured.notes.get("comes_to_rest") == "yes":
             return "at rest"
         temperature = self.measured.numbers.get("mean_temperature", math.inf)
@@ -57,7 +57,7 @@ class StudyResult:
 
     @property
     def is_slow(self) -> bool:
-        """Whether it moves, and changes slowly enough for averages over its time to be those of one state."""
+        """Whether it moves, and changes slowly enough for time averages to be those of one state."""
         drifts = [abs(one.value) for one in self.measured.drifts.values()]
         return self.state != "at rest" and max(drifts, default=0.0) < SLOW
 
@@ -85,10 +85,10 @@ def read_folder(folder: str | os.PathLike[str], closures: Sequence[str] = CLOSUR
 
 
 def thinned(measured: Measured, heights: int = HEIGHTS) -> Measured:
-    """``measured`` at fewer heights, spread evenly over the overburden; the means over tenths stay what they are."""
-    share = measured.share
-    wanted = np.linspace(float(np.nanmax(share)), max(float(np.nanmin(share)), 0.02), heights)
-    chosen = np.unique([int(np.nanargmin(np.abs(share - value))) for value in wanted])
+    """``measured`` at fewer heights, spread evenly over the overburden; the means over tenths stay the same."""
+    fraction = measured.fraction_above
+    wanted = np.linspace(float(np.nanmax(fraction)), max(float(np.nanmin(fraction)), 0.02), heights)
+    chosen = np.unique([int(np.nanargmin(np.abs(fraction - value))) for value in wanted])
     return replace(
         measured,
         height=measured.height[chosen],
@@ -100,8 +100,8 @@ def thinned(measured: Measured, heights: int = HEIGHTS) -> Measured:
 def rest_slope(roughness: float) -> float:
     """The slope up to which a grain without friction rests in a pocket of a triangular base, rows across the slope,
     with bumps as large as grains: (r/sqrt 3)/sqrt(1 - 4 r^2/3)."""
-    room = 1.0 - 4.0 * roughness**2 / 3.0
-    return roughness / math.sqrt(3.0) / math.sqrt(room) if room > 0.0 else math.inf
+    squared_height = 1.0 - 4.0 * roughness**2 / 3.0
+    return roughness / math.sqrt(3.0) / math.sqrt(squared_height) if squared_height > 0.0 else math.inf
 
 
 def table(results: Sequence[StudyResult], closures: Sequence[str] = CLOSURES) -> list[list[str]]:

@@ -1,4 +1,4 @@
-"""A run in its folder: written, started, watched, and resumed where it was."""
+"""Runs of LAMMPS in folders: their input files, start, progress and resumption."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RECORD, LOCK = "run.json", "run.lock"
 _SPARE = 30_000_000
 #: Grains are at rest where the mean squares of their velocities are below this; so many blocks of it are measured.
 _STILL, _RESTING = 1e-9, 4
-#: Lines of output that are kept, to tell a failure from.
+#: Lines of output that are kept to explain a failure.
 _KEPT = 200
 _STEP = re.compile(r"\s*(\d+)\s+[-\d.e+]+")
 
@@ -68,13 +68,13 @@ class Run:
 
     @property
     def is_complete(self) -> bool:
-        """Whether it has come to its end, or its grains to rest."""
+        """Whether it has reached its last step, or its grains are at rest."""
         return self.done >= self.steps.last or self.is_at_rest
 
 
 @dataclass(frozen=True)
 class Moment:
-    """How far a run is: its time step, the last one, and the time that is."""
+    """The progress of a run: its time step, the last one, and the time."""
 
     step: int
     last: int
@@ -82,8 +82,8 @@ class Moment:
 
 
 def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) -> Run:
-    """The run in ``folder``, with its input files; one that is there already has to be of the same scene, and goes on
-    to the end of ``schedule``.
+    """The run in ``folder``, with its input files; an existing run must be of the same scene, and goes
+    on to the end of ``schedule``.
 
     Raises:
         InputError: for a folder that holds something else or cannot be written, or a disk that is too small.
@@ -100,10 +100,10 @@ def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) ->
         return run
     try:
         path.mkdir(parents=True, exist_ok=True)
-        strangers = [entry.name for entry in path.iterdir() if entry.name != LOCK]
+        others = [entry.name for entry in path.iterdir() if entry.name != LOCK]
     except OSError as error:
         raise InputError(f"cannot write {folder}: {error.strerror or error}") from None
-    if strangers:
+    if others:
         raise InputError(f"{folder} is not empty and holds no run: name another folder")
     needed, free = script.bytes_written(scene, schedule), shutil.disk_usage(path).free
     if needed + _SPARE > free:
@@ -143,13 +143,13 @@ def read_record(folder: str | os.PathLike[str]) -> Run:
 
 
 def go_on(run: Run, processes: int = 1) -> Generator[Moment, None, None]:
-    """Run LAMMPS from where the run is to its end, and tell how far it is.
+    """Run or resume LAMMPS to the end of the schedule, and yield the progress.
 
     Raises:
         EngineError: where LAMMPS is missing or fails, naming the reason; what was written is kept.
-        InputError: where another process is at the same run.
+        InputError: where another process uses the same run.
     """
-    with _held(run.folder):
+    with _locked(run.folder):
         if run.is_complete:
             return
         chosen = engine(processes)
@@ -252,15 +252,15 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """The folder for this process alone."""
+def _locked(folder: Path) -> Iterator[None]:
+    """Lock the folder against other processes."""
     from filelock import FileLock, Timeout
 
     lock = FileLock(folder / LOCK, timeout=0)
     try:
         lock.acquire()
     except Timeout:
-        raise InputError(f"another process is at the run in {folder}") from None
+        raise InputError(f"another process uses the run in {folder}") from None
     except OSError as error:
         raise InputError(f"cannot write {folder}: {error.strerror or error}") from None
     try:

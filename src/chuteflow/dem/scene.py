@@ -1,12 +1,12 @@
-"""A scene: a chute, a hold-up and a box, made into bumps on a plane and grains above it.
+"""Scenes: a chute, a hold-up and a box, with bumps on a plane and grains above it.
 
 # notation: d_w diameter of the bumps, s_w their mean gap, r roughness (2.8), L distance of the bumps' centres,
 # n bumps per unit area, dbar = (1 + d_w)/2.
 
 The bumps are spheres whose centres lie in the plane z = 0, a flat wall. By (2.8) r = (s_w + d_w)/(1 + d_w), so that
-bumps on a triangular lattice are L = s_w + d_w = r (1 + d_w) apart. In the derivation of the base a bump has the area
-pi (r dbar)^2 to itself; of n bumps a unit area that gives r = 1/(dbar sqrt(pi n)) instead, 5.0 % more on a lattice.
-Both are known of a scene, and a random base has the density of bumps that the lattice of its r has.
+bumps on a triangular lattice are L = s_w + d_w = r (1 + d_w) apart. In the derivation of the base the area of a bump is
+pi (r dbar)^2; with n bumps per unit area that gives r = 1/(dbar sqrt(pi n)) instead, 5.0 % more on a lattice.
+A scene has both, and a random base has the density of bumps that the lattice of its r has.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from chuteflow.steady.chute import Chute
 BASES, STARTS = ("triangular", "random"), ("hot", "cold")
 #: Smallest restitution: the dashpot of a smaller one keeps grains together for long.
 SOFTEST = 0.05
-#: Share of the plane covered by bumps up to which they are placed at random; discs order above 0.70.
+#: Fraction of the plane covered by bumps up to which they are placed at random; discs order above 0.70.
 MOST_COVERED = 0.68
 #: Sweeps of Monte Carlo moves that make a lattice of bumps random.
 _SWEEPS = 400
@@ -43,7 +43,7 @@ _MOST_GRAINS = 2_000_000
 
 @dataclass(frozen=True)
 class Scene:
-    """What is simulated, all of it dimensionless.
+    """The parameters of a simulation, all dimensionless.
 
     Args:
         chute: slope, restitutions and roughness; its base and surface are not asked.
@@ -173,7 +173,7 @@ class Scene:
     @cached_property
     def contacts(self) -> Contacts:
         """The contacts: overlaps are bounded at the temperature of the start, or at T = 1 where that is colder, and
-        contact times at nu = 0.3 and T = 1. What they were in the run is measured."""
+        contact times at nu = 0.3 and T = 1. The values in the run are measured."""
         chute = self.chute
         if self.stiffness is not None:
             e, e_w = chute.restitution, chute.wall_restitution
@@ -243,7 +243,7 @@ def bump_positions(scene: Scene) -> Array:
 
 
 def _shuffled(scene: Scene, lattice: Array) -> Array:
-    """Hard discs moved at random, from a lattice on: Monte Carlo moves that let none overlap."""
+    """Hard discs in random positions: Monte Carlo moves from a lattice, without overlap."""
     random = np.random.default_rng([scene.seed, 1])
     size, centres = np.array(scene.size), lattice.copy()
     reach = 0.7 * max(scene.spacing - scene.bump_diameter, 0.1 * scene.spacing)

@@ -1,4 +1,4 @@
-"""The input of LAMMPS for a scene: files that run with any LAMMPS that has the package GRANULAR, here or elsewhere.
+"""The input of LAMMPS for a scene: files for any LAMMPS that has the package GRANULAR.
 
 A folder holds grains.data (all positions), settings.in (everything but where the grains come from), start.in and
 resume.in. LAMMPS writes layers.txt, totals.txt, waves.txt, contacts.dump and the restart files state.a and state.b
@@ -34,14 +34,14 @@ WAVE_PARTS = tuple(
 )
 #: Times between samples of the velocities, between lines of totals.txt and between frames of contacts.dump.
 _SAMPLE, _LINE = 0.05, 1.0
-_MOST_BLOCKS = 400
+_MOST_BLOCKS = 1000
 
 
 @dataclass(frozen=True)
 class Schedule:
     """How long a run is, in time units: it settles, and then it is measured in blocks of ``block`` each.
 
-    ``frame`` is the time between two pictures of the grains in contact.
+    ``frame`` is the time between two snapshots of the grains in contact.
     """
 
     settle: float = 300.0
@@ -218,9 +218,9 @@ def contact_lines(contacts: Contacts) -> list[str]:
 
 
 def _law(contacts: Contacts, restitution: float) -> str:
-    share = contacts.tangential_share(restitution)
+    ratio = contacts.tangential_ratio(restitution)
     return (
-        f"hooke {contacts.stiffness!r} {restitution!r} tangential linear_nohistory {share!r} {contacts.friction!r} "
+        f"hooke {contacts.stiffness!r} {restitution!r} tangential linear_nohistory {ratio!r} {contacts.friction!r} "
         "damping coeff_restitution"
     )
 

@@ -8,22 +8,22 @@ from dataclasses import dataclass
 from chuteflow.dem.correlation import long_run_variance
 from chuteflow.dem.output import Array
 
-#: Drifts are given over this time, and steady is below this share of the mean.
+#: Drifts are given over this time, and steady is below this fraction of the mean.
 SPAN, LIMIT = 300.0, 0.01
-#: Values that a drift is told from, at least.
+#: Smallest number of values for a drift.
 FEWEST = 10
 
 
 @dataclass(frozen=True)
 class Drift:
-    """The change of a number over 300 time units, as a share of its mean, with its standard error."""
+    """The change of a number over 300 time units, as a fraction of its mean, with its standard error."""
 
     value: float
     error: float
 
     @property
-    def verdict(self) -> str:
-        """ "steady", "not steady" or "undecided": a limit of 1 % against the drift within two errors."""
+    def steadiness(self) -> str:
+        """ "steady", "not steady" or "undecided": the drift, within two errors, compared with 1 %."""
         if not math.isfinite(self.value + self.error):
             return "undecided"
         if abs(self.value) + 2.0 * self.error < LIMIT:
@@ -32,8 +32,8 @@ class Drift:
 
 
 def drift(times: Array, values: Array) -> Drift:
-    """The drift of ``values`` (n,) at ``times`` (n,), as even as they are: that of a straight line through them; its
-    error is that of their scatter about the line, whose correlation counts."""
+    """The drift of ``values`` (n,) at evenly spaced ``times`` (n,): that of a straight line through them. Its error
+    follows from the scatter about the line, with its correlation."""
     if len(values) < FEWEST or not values.mean():
         return Drift(math.nan, math.nan)
     away = times - times.mean()
@@ -45,9 +45,9 @@ def drift(times: Array, values: Array) -> Drift:
     return Drift(slope * scale, error * scale)
 
 
-def verdict(drifts: dict[str, Drift]) -> str:
+def overall_steadiness(drifts: dict[str, Drift]) -> str:
     """Of several drifts: "not steady" if one is, "steady" if all are, else "undecided"."""
-    found = {one.verdict for one in drifts.values()}
+    found = {one.steadiness for one in drifts.values()}
     if "not steady" in found:
         return "not steady"
     return "steady" if found == {"steady"} else "undecided"

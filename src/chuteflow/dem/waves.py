@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,12 @@ Complex = NDArray[np.complex128]
 DIRECTIONS = {"along": 0, "across": 4}
 #: Columns of a file.
 _COLUMNS = ("t", "density_re", "density_im", "momentum_re", "momentum_im")
-#: Values that a wave is fitted to, at least.
+#: Smallest number of values to which a wave is fitted.
 _FEWEST = 20
 #: Frequencies that are tried first, in numbers of periods in the window.
 _PERIODS = np.arange(0.5, 12.1, 0.5)
+#: Waves that errors are taken from, and values in a row that their noise is taken in.
+_REDRAWN, _BLOCK = 60, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +64,14 @@ class Amplitudes:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a wave grows: its ``rate`` and ``frequency``, and ``share``, of the mean squares of both amplitudes, what
-    one wave of constant rate explains."""
+    """The growth of a wave: its ``rate`` and ``frequency`` with their standard errors, and ``explained``, the fraction
+    of the mean squares of both amplitudes that one wave of constant rate explains."""
 
     rate: float
     frequency: float
-    share: float
+    rate_error: float
+    frequency_error: float
+    explained: float
 
 
 def amplitudes(run: Run, direction: str) -> Amplitudes:
@@ -112,21 +117,61 @@ def read_amplitudes(path: str | os.PathLike[str]) -> Amplitudes:
 
 
 def growth(waves: Amplitudes) -> Growth:
-    """Rate and frequency of the wave over all of its times."""
+    """Rate and frequency of the wave over all of its times.
+
+    The noise of the grains drives the wave, so that what it does at one time is seen at all later ones. Errors are how
+    far the same fit is off for waves that start as this one, driven by its own noise in another order. They know
+    nothing of a rate that changes within the window.
+    """
+    times = waves.times - waves.times.mean()
+    data = np.stack([one / np.sqrt(np.mean(np.abs(one) ** 2)) for one in (waves.density, waves.momentum)], axis=1)
+    starts = [complex(0.0, 2.0 * math.pi * periods / np.ptp(times)) for periods in _PERIODS]
+    s, left = _fit_exponent(times, data, starts)
+    off = np.array([_fit_exponent(times, one, [s])[0] for one in _redrawn(times, data, s)]) - s
+    errors = np.sqrt(np.mean(off.real**2)), np.sqrt(np.mean(off.imag**2))
+    explained = 1.0 - left / float(np.sum(np.abs(data) ** 2))
+    return Growth(s.real, abs(s.imag), float(errors[0]), float(errors[1]), explained)
+
+
+def _modes(times: Array, s: complex) -> Complex:
+    """exp(s t) and exp(s* t), (n, 2)."""
+    return np.exp(np.stack([s * times, s.conjugate() * times], axis=1))
+
+
+def _fit_exponent(times: Array, data: Complex, starts: Sequence[complex]) -> tuple[complex, float]:
+    """The s with which :func:`_modes` are nearest to ``data`` (n, 2), from the best of ``starts``, and the sum of the
+    squares that are left."""
     from scipy.optimize import least_squares
 
-    times = waves.times - waves.times.mean()
     half = 0.5 * float(np.ptp(times))
-    data = np.stack([one / np.sqrt(np.mean(np.abs(one) ** 2)) for one in (waves.density, waves.momentum)], axis=1)
 
-    def left(x: Array) -> Array:
-        s = complex(x[0], x[1]) / half
-        modes = np.exp(np.stack([s * times, s.conjugate() * times], axis=1))
+    def residual(x: Array) -> Array:
+        modes = _modes(times, complex(x[0], x[1]) / half)
         rest = data - modes @ np.linalg.lstsq(modes, data, rcond=None)[0]
         return np.concatenate([rest.real.ravel(), rest.imag.ravel()])
 
-    tried = [np.array([0.0, math.pi * periods]) for periods in _PERIODS]
-    first = min(tried, key=lambda x: float(left(x) @ left(x)))
-    found: Any = least_squares(left, first)
-    rate, frequency = found.x / half
-    return Growth(float(rate), abs(float(frequency)), 1.0 - 2.0 * float(found.cost) / float(np.sum(np.abs(data) ** 2)))
+    tried = [np.array([s.real, s.imag]) * half for s in starts]
+    first = min(tried, key=lambda x: float(residual(x) @ residual(x)))
+    found: Any = least_squares(residual, first)
+    return complex(found.x[0], found.x[1]) / half, 2.0 * float(found.cost)
+
+
+def _redrawn(times: Array, data: Complex, s: complex) -> Iterator[Any]:
+    """Waves (n, 2) that start as ``data`` and are driven by its noise, in blocks in another order.
+
+    In terms of the two modes, z exp(-s t) is constant but for the noise, whose steps follow from the data.
+    """
+    step = float(times[1] - times[0])
+    factors = np.exp(np.array([s, s.conjugate()]) * step)
+    shapes = np.linalg.lstsq(_modes(times, s), data, rcond=None)[0]
+    states = data @ np.linalg.pinv(shapes)
+    noise = states[1:] - factors * states[:-1]
+    random = np.random.default_rng(0)
+    count = len(noise)
+    for _ in range(_REDRAWN):
+        begins = random.integers(0, count - _BLOCK + 1, size=-(-count // _BLOCK))
+        steps = np.concatenate([noise[begin : begin + _BLOCK] for begin in begins])[:count]
+        again = [states[0]]
+        for one in steps:
+            again.append(factors * again[-1] + one)
+        yield np.array(again) @ shapes

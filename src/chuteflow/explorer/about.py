@@ -1,4 +1,4 @@
-"""What the page is told before it asks anything: what can be set, cases, and what quantities are called."""
+"""Metadata for the page: its controls, cases, quantities and their units."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from chuteflow.steady.quantities import QUANTITIES
 from chuteflow.steady.validity import WORDS
 
 
-def about(data: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """Controls, cases, words and quantities, as JSON has them, with ``data``, what was measured."""
+def about(data: Sequence[Mapping[str, Any]] = (), first: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Controls, cases, limits of validity and quantities as JSON objects, with ``data``, the measurements, and
+    ``first``, what the state has at first that the first case has not."""
     return {
         "version": __version__,
         "data": list(data),
+        "first": dict(first or {}),
         "controls": {name: asdict(control) for name, control in queries.CONTROLS.items()},
         "presets": [asdict(preset) for preset in queries.PRESETS],
         "cases": [asdict(case) for case in queries.cases()],

@@ -1,7 +1,8 @@
-"""Answers to the questions of the page, made in a process beside the server."""
+"""Answers to the questions of the page, computed in a worker process of the server."""
 
 from __future__ import annotations
 
+import base64
 import json
 import tempfile
 from collections.abc import Callable
@@ -15,25 +16,27 @@ import numpy as np
 from chuteflow.branches.curve import curve
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.results import Curve
+from chuteflow.checks import number_in
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.contents import curve_content, limits_passed, short
+from chuteflow.explorer.heights import refine_heights
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
-from chuteflow.explorer.straight import straight_heights
 from chuteflow.io import contract
+from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS
 
-#: Relative error allowed: far below what can be seen on a page. Exports are exact.
+#: Relative error allowed: too small to be visible on a page. Exports use the default tolerance.
 _VISIBLE = 1e-6
 _CURVE_POINTS = 90
 #: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
-#: they are halved until a straight line across each is off by this share of a field's largest value at most.
+#: they are halved until linear interpolation across each is accurate to this fraction of a field's largest value.
 _INTERVALS, _STRAIGHT = 16, 1e-3
-#: What else a computation may end with, which is no reason to end the process.
+#: Other errors of a computation, after which the process goes on.
 _FAILURES = (ArithmeticError, ValueError, LookupError)
 
 
@@ -71,6 +74,7 @@ _LEFT_OUT = {
     "limits": "where the curve passes limits of the theory is left out",
     "map": "this column of the map is left out",
     "export": "this file is left out",
+    "data": "this file is not read",
     "stability": "the stability of this flow is left out",
 }
 
@@ -121,11 +125,11 @@ def _place(flow: Flow) -> dict[str, Any]:
 
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
-    """Fields over height, at so many heights that straight lines between them show no corner that is not there."""
+    """Fields over height, at heights so close that linear interpolation between them is accurate."""
     highest = min(top, flow.interface_height)
     own = min(TOP * flow.centre_of_mass, highest)
     first = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
-    heights, (found,) = straight_heights([partial(fields, flow)], first, _STRAIGHT)
+    heights, (found,) = refine_heights([partial(fields, flow)], first, _STRAIGHT)
     return {"z": short(heights)} | {name: short(field) for name, field in zip(FIELDS, found, strict=True)}
 
 
@@ -143,7 +147,7 @@ def _limits(query: Query) -> Answer:
 
 @lru_cache(maxsize=4)
 def _drawn(chute: Chute) -> Curve:
-    """The curve as the page draws it; its flows are told by their numbers."""
+    """The curve as the page draws it; a query refers to its flows by their indices."""
     return curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
 
 
@@ -154,7 +158,7 @@ def _map(query: Query) -> Answer:
 
 
 def _stability(query: Query) -> Answer:
-    from chuteflow.explorer.growth import verdict
+    from chuteflow.explorer.growth import examine_stability
 
     at_flux = "branch" not in query
     chute, other = queries.read(query, other=("Q", "flow") if at_flux else ("branch", "point"), optional=GRAINS)
@@ -166,7 +170,7 @@ def _stability(query: Query) -> Answer:
         branches = _drawn(chute).branches
         branch = branches[queries.place("branch", other, len(branches))]
         flow = branch.flows[queries.place("point", other, len(branch.flows))]
-    known = verdict(flow)
+    known = examine_stability(flow)
     says, waves = sentences.of_stability(known, chute, scales), sentences.of_waves(known, chute, scales)
     return _json(asdict(known) | {"says": says, "waves": waves})
 
@@ -202,6 +206,16 @@ def _export(query: Query) -> Answer:
         return Answer(200, media[suffix], path.read_bytes(), path.name)
 
 
+def _data(query: Query) -> Answer:
+    """What was measured, from a file that was sent: its ``name`` and its ``content`` in base64."""
+    from chuteflow.explorer.data import read_sent
+
+    name, slope = queries.file_name(query), query.get("slope")
+    content = base64.b64decode(query["content"])
+    at = None if slope is None else PARAMETERS["slope"].checked(number_in("slope", slope, 0.0))
+    return _json({"data": read_sent(name, content, slope=at, scales=queries.scales(query))})
+
+
 #: What can be asked, by the last part of its address.
 QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "flows": _flows,
@@ -210,4 +224,5 @@ QUESTIONS: dict[str, Callable[[Query], Answer]] = {
     "map": _map,
     "stability": _stability,
     "export": _export,
+    "data": _data,
 }

@@ -1,7 +1,7 @@
-"""Connections of the server, bounded in time and in number, so that those who never finish a request shut out nobody.
+"""Connections of the server, limited in time and number: clients who never finish a request do not block others.
 
-A connection either waits for a request or is answered. While it waits it may be dropped: at once where others need
-its place, and after some seconds in any case. The connections of one client are dropped before those of others.
+A connection either waits for a request or is answered. A waiting connection is closed after some seconds, and at once
+where the limit on their number is reached: the client with the most connections loses one first.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-#: Seconds within which a request has to be there as a whole, and within which its answer has to be taken.
+#: Seconds within which a request must be complete, and within which its answer must be received.
 _REQUEST, _ANSWER = 10.0, 300.0
-#: Connections of one client that may wait for a request, once each has had so many seconds for it.
+#: Connections of one client that may wait for a request longer than so many seconds.
 _WAITING, _AT_FIRST = 32, 1.0
-#: Connections in all, as far as the system allows so many files, some of which are for other purposes.
+#: Connections in all, if the system allows so many open files, and files that are left for other purposes.
 _MOST, _OTHER_FILES = 512, 64
 #: Ticks of the server, of 0.1 s, between two inspections.
 _TICKS = 5
@@ -50,8 +50,8 @@ class Connection(H11Protocol):
         super().connection_made(transport)
         self.since = self.loop.time()
         others = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
-        if len(others) > most():
-            _most_dispensable(others).drop(503, "too many connections: finish requests, and close what is not needed")
+        if len(others) > connection_limit():
+            _connection_to_drop(others).drop(503, "too many connections: finish requests, and close what is not needed")
 
     def data_received(self, data: bytes) -> None:
         """Take a part of a request."""
@@ -85,7 +85,7 @@ class Connection(H11Protocol):
 
 
 def drop_overdue(connections: Iterable[Connection], now: float) -> None:
-    """Drop connections that took too long, and those of a client that has too many waiting."""
+    """Close connections that took too long, and those of a client that has too many waiting."""
     waiting: defaultdict[str, list[Connection]] = defaultdict(list)
     for connection in list(connections):
         age = now - connection.since
@@ -94,14 +94,14 @@ def drop_overdue(connections: Iterable[Connection], now: float) -> None:
         elif connection.waits and age > _AT_FIRST:
             waiting[connection.address].append(connection)
         elif age > _ANSWER:
-            connection.drop(408, "the answer was not taken")
+            connection.drop(408, "the answer was not received")
     for address, those in waiting.items():
-        those.sort(key=_worth)
+        those.sort(key=_priority)
         for connection in those[: max(0, len(those) - _WAITING)]:
             connection.drop(503, f"{address} has more than {_WAITING} unfinished requests: finish them first")
 
 
-def most() -> int:
+def connection_limit() -> int:
     """How many connections there may be."""
     try:
         import resource
@@ -111,15 +111,15 @@ def most() -> int:
     return _MOST if files == resource.RLIM_INFINITY else max(8, min(_MOST, files - _OTHER_FILES))
 
 
-def _most_dispensable(connections: Iterable[Connection]) -> Connection:
-    """Of the client with the most connections: one that waits, if there is one, since long."""
+def _connection_to_drop(connections: Iterable[Connection]) -> Connection:
+    """Of the client with the most connections: one that waits, if there is one, the oldest first."""
     of_client: defaultdict[str, list[Connection]] = defaultdict(list)
     for connection in connections:
         of_client[connection.address].append(connection)
-    return min(max(of_client.values(), key=len), key=lambda one: (not one.waits, *_worth(one)))
+    return min(max(of_client.values(), key=len), key=lambda one: (not one.waits, *_priority(one)))
 
 
-def _worth(connection: Connection) -> tuple[bool, float]:
+def _priority(connection: Connection) -> tuple[bool, float]:
     """Connections on which a request was answered are worth more, then those that are younger."""
     return connection.answered > 0, connection.since
 

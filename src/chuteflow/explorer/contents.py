@@ -1,4 +1,4 @@
-"""Parts of answers that pages with and without a server share."""
+"""Parts of answers that are common to pages with and without a server."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _DIGITS = 7
 
 
 def curve_content(found: Curve, scales: Scales | None) -> dict[str, Any]:
-    """A curve as the page draws it, without the limits of the theory, which take longer than the rest."""
+    """A curve as the page draws it, without the limits of the theory, which take longer to compute."""
     return {
         "branches": [_branch(branch) for branch in found.branches],
         "reason": found.reason,
@@ -34,8 +34,10 @@ def _branch(branch: Branch) -> dict[str, Any]:
 
 
 def densities(branch: Branch) -> list[str]:
-    """The kind of density of each flow of a branch: it changes at the onsets of inversion, which are located, so that
-    few flows have to be looked at."""
+    """The kind of density of each flow of a branch.
+
+    It changes at the onsets of inversion, which are located, so that few flows have to be evaluated.
+    """
     onsets = [point.position + 1 for point in branch.special if point.kind == "density-inversion"]
     found: list[str] = []
     for first, end in pairwise([0, *onsets, len(branch.flows)]):
@@ -46,7 +48,7 @@ def densities(branch: Branch) -> list[str]:
 
 
 def limits_passed(branch: Branch) -> list[tuple[str, ...]]:
-    """Which limits of the theory each flow of a branch passes, in words."""
+    """The limits of the theory that each flow of a branch exceeds, by name."""
     return [flow.validity.words for flow in branch.flows]
 
 

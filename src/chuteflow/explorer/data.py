@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from chuteflow.errors import InputError
 from chuteflow.explorer.contents import short
 from chuteflow.fitting.measurements import Experiment, Scalar, Series
 from chuteflow.io.contract import SHORT
+from chuteflow.io.units import WITHOUT_GRAINS
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.quantities import PLACE, QUANTITIES, Scales
@@ -24,6 +26,8 @@ _PROFILES = {"nu": "volume_fraction", "T": "granular_temperature", "u": "velocit
 _NUMBERS = {QUANTITIES[name].symbol: name for name in PLACE}
 #: Files, flows and heights of a flow at most.
 _MOST_FLOWS, _MOST_HEIGHTS = 40, 400
+#: What the page says of a unit where it has no grains.
+_GRAINS_OF_PAGE = "a unit needs the grains: tick SI units, and give their diameter and density there"
 #: A line at the beginning of a table of a particle run.
 _HEAD = re.compile(rb"^#\s*(?:slope|e)\s*=", re.MULTILINE)
 
@@ -32,7 +36,8 @@ def read_data(
     paths: Sequence[str | os.PathLike[str]], *, slope: float | None = None, scales: Scales | None = None
 ) -> list[dict[str, Any]]:
     """What was measured, one entry for each flow: ``name``, ``what`` it is, ``profiles`` and ``numbers`` with errors
-    by symbol, and ``given``, parameters of its chute by key. All is dimensionless.
+    by symbol, ``given``, parameters of its chute by key, and the ``slope`` that scales of its units belong to, or None.
+    All is dimensionless.
 
     Args:
         paths: CSV as ``chuteflow fit`` reads it, and particle runs (.nc or .csv) as ``chuteflow dem read`` writes them.
@@ -48,6 +53,26 @@ def read_data(
     return found
 
 
+def read_sent(
+    name: str, content: bytes, *, slope: float | None = None, scales: Scales | None = None
+) -> list[dict[str, Any]]:
+    """What was measured, from the ``content`` of a file of some ``name``, as :func:`read_data`.
+
+    Raises:
+        InputError: as :func:`read_data`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_bytes(content)
+        try:
+            return read_data([path], slope=slope, scales=scales)
+        except InputError as error:
+            said = str(error).replace(f"{path}", name).replace("--data: ", "")
+            raise InputError(
+                said.replace(WITHOUT_GRAINS, "a unit needs the grains: tick SI units and give them")
+            ) from None
+
+
 def _read(path: Path, slope: float | None, scales: Scales | None) -> Iterator[dict[str, Any]]:
     if _is_run(path):
         from chuteflow.dem.records import load
@@ -59,7 +84,7 @@ def _read(path: Path, slope: float | None, scales: Scales | None) -> Iterator[di
     found = read_measurements(path, slope=slope, scales=scales)
     for one in found.experiments:
         name = path.stem if len(found.experiments) == 1 else f"{path.stem}, {one.name}"
-        yield _of_experiment(name, one, known=found.errors_known)
+        yield _of_experiment(name, one, known=found.errors_known) | {"slope": one.given.get("slope", slope)}
 
 
 def _is_run(path: Path) -> bool:
@@ -85,7 +110,10 @@ def _of_run(name: str, run: Measured) -> dict[str, Any]:
     values = {SHORT[name]: getattr(run, name) for name in PARAMETERS}
     given = {key: float(value) for key, value in values.items() if np.isfinite(value)}
     what = f"particle run, {run.steadiness}; heights above the centres of the bumps"
-    return {"name": name, "what": what, "profiles": profiles, "numbers": numbers, "given": given}
+    return {
+        **{"name": name, "what": what, "profiles": profiles, "numbers": numbers, "given": given},
+        "slope": given.get("slope"),
+    }
 
 
 def _of_experiment(name: str, one: Experiment, *, known: bool) -> dict[str, Any]:
@@ -109,7 +137,7 @@ def _of_experiment(name: str, one: Experiment, *, known: bool) -> dict[str, Any]
 
 
 def _profile(height: Array, value: Array, error: Array | None) -> dict[str, list[float] | None]:
-    """Values at heights where there are some, thinned to what can be told apart; without errors None."""
+    """Values at the heights that have one, thinned to _MOST_HEIGHTS; ``error`` is None where errors are unknown."""
     there = np.flatnonzero(np.isfinite(value))
     there = there[:: max(1, -(-len(there) // _MOST_HEIGHTS))]
     errors = None if error is None else short(np.nan_to_num(np.broadcast_to(error, value.shape)[there]))

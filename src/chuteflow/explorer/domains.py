@@ -11,17 +11,17 @@ from chuteflow.maps.plane import HOT_CODES, SUMMARY, ParameterAxis, ParameterPla
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 
-#: Points of a column that are looked at first, and the share of it to which a boundary is then located: coarser
-#: where every point has trajectories of its own, finer for what is known in closed form.
+#: Points of a column that are classified first, and the fraction of it to which a boundary is then located: coarser
+#: where every point needs its own trajectories, finer for hot flows, which are known in closed form.
 _FIRST, _FIRST_HOT = 9, 33
-#: The same of a coarse column, which takes hot flows from the same search.
+#: The same of a coarse column, which takes hot flows from the search.
 _FIRST_COARSE, _TOLERANCE_COARSE = 5, 0.06
 _TOLERANCE, _HOT_TOLERANCE = {True: 0.008, False: 0.016}, 1e-3
 
 
 @dataclass(frozen=True)
 class MapColumn:
-    """What chutes are like along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
+    """Classes of chutes along the parameter ``inner`` where ``outer`` is ``at``; both are names of a query.
 
     ``parts`` are by name "most" (flows that share a flux), "families", "interior" and "density" (bits, see
     :mod:`chuteflow.maps.kinds`), and "hot" (1 where there are flows at every high temperature, -1
@@ -36,7 +36,7 @@ class MapColumn:
 
 
 def map_column(asked: ColumnAsked) -> MapColumn:
-    """The column of the map that is asked for.
+    """Classify one column of the map.
 
     Raises:
         InputError: where a corner of the map is no chute.
@@ -49,7 +49,7 @@ def map_column(asked: ColumnAsked) -> MapColumn:
     found = classify_column(
         place, partial(summarise, plane), [*_evenly(first), *_beside(plane, asked, tolerance)], tolerance
     )
-    # Narrower bands are where the search happened to meet them.
+    # Narrower bands are found only by chance.
     parts = {name: part.without_bands(tolerance) for name, part in zip(SUMMARY, found.parts, strict=True)}
     if plane.hot_known and not asked.coarse:
         hot = classify_column(place, partial(classify_hot, plane), _evenly(_FIRST_HOT), _HOT_TOLERANCE)
@@ -64,9 +64,9 @@ def map_column(asked: ColumnAsked) -> MapColumn:
 
 
 def _beside(plane: ParameterPlane, asked: ColumnAsked, tolerance: float) -> list[float]:
-    """Shares of the inner axis a little to either side of what is near, closer together than what is halved."""
-    shares = [(value - plane.inner.low) / (plane.inner.high - plane.inner.low) for value in asked.near]
-    return [share + side * tolerance for share in shares for side in (-0.49, 0.49)]
+    """Fractions of the inner axis just below and above the ``near`` values, closer together than the tolerance."""
+    fractions = [(value - plane.inner.low) / (plane.inner.high - plane.inner.low) for value in asked.near]
+    return [fraction + side * tolerance for fraction in fractions for side in (-0.49, 0.49)]
 
 
 @lru_cache(maxsize=8)

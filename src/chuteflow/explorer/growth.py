@@ -1,4 +1,4 @@
-"""Whether a flow is stable, in the few numbers and words that the page has room for."""
+"""The linear stability of a flow, in the few numbers that the page shows."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Wave:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What is known about the stability of a flow: ``state`` is "stable", "unstable" or "unknown".
+class FlowStability:
+    """The stability of a flow as far as examined: ``state`` is "stable", "unstable" or "unknown".
 
-    ``searched`` are the shortest and the longest wave that were looked at (in d), ``fastest`` is the fastest
-    growing one if the flow is unstable; ``reason`` says why nothing is known.
+    ``searched`` are the shortest and the longest wavelength examined (in d), ``fastest`` is the fastest growing wave
+    of an unstable flow; ``reason`` says why the stability is unknown.
     """
 
     state: str
@@ -37,20 +37,20 @@ class Verdict:
     reason: str | None = None
 
 
-def verdict(flow: Flow) -> Verdict:
-    """What is known about the stability of ``flow``."""
+def examine_stability(flow: Flow) -> FlowStability:
+    """Examine the linear stability of ``flow``."""
     try:
         found = stability_of(flow)
     except (InputError, SolveError) as error:
-        return Verdict("unknown", reason=str(error))
+        return FlowStability("unknown", reason=str(error))
     smallest, largest = found.searched
     searched = 2.0 * math.pi / largest, 2.0 * math.pi / smallest
     mode = found.mode
     if found.stable is None:
-        return Verdict("unknown", searched, reason=f"{len(found.unresolved)} wavenumbers are not resolved")
+        return FlowStability("unknown", searched, reason=f"{len(found.unresolved)} wavenumbers are not resolved")
     if found.stable or mode is None:
-        return Verdict("stable", searched)
+        return FlowStability("stable", searched)
     k = math.hypot(mode.kx, mode.ky)
-    return Verdict(
+    return FlowStability(
         "unstable", searched, Wave(mode.direction, 2.0 * math.pi / k if k else None, mode.growth, mode.error)
     )

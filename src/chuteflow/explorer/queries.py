@@ -1,12 +1,13 @@
-"""What a request asks: the chute, the flux, the grains and the axes of its query, checked."""
+"""Queries of the page, parsed and checked: the chute, the flux, the grains and the axes of the map."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chuteflow.checks import number_in
+from chuteflow.checks import number_in, shown
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
@@ -25,7 +26,7 @@ GRAINS = ("diameter", "density")
 
 @dataclass(frozen=True)
 class Control:
-    """A slider: its range and what it means. The number field beside it takes all that a chute allows."""
+    """A slider, its range and its meaning. The number field beside it accepts the whole range of a chute."""
 
     label: str
     symbol: str
@@ -36,33 +37,31 @@ class Control:
 
 
 CONTROLS = {
-    "slope": Control("Slope", "tan θ", 0.05, 0.7, False, "How steep the chute is: gravity along it drives the flow."),
-    "e": Control("Restitution", "e", 0.5, 1.0, False, "Share of speed that two grains keep as they collide; 1 is all."),
-    "ew": Control("Base restitution", "e_w", 0.0, 1.0, False, "Share of speed that a grain keeps as it hits the base."),
+    "slope": Control("Slope", "tan θ", 0.05, 0.7, False, "Slope of the chute; gravity along it drives the flow."),
+    "e": Control("Restitution", "e", 0.5, 1.0, False, "Of two colliding grains; 1 is elastic."),
+    "ew": Control("Base restitution", "e_w", 0.0, 1.0, False, "Of a grain that collides with the base; 1 is elastic."),
     "roughness": Control(
         "Roughness",
         "r",
         BY_KEY["roughness"].low,
         BY_KEY["roughness"].high,
         False,
-        "How deep a grain sinks between those glued to the base.",
+        "How deep a grain sinks between the grains fixed to the base.",
     ),
-    "Q": Control(
-        "Mass flux", "Q", *FLUX_RANGE, True, "Mass that passes per unit width and time, here in ρd√(gd cos θ)."
-    ),
+    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time, in ρd√(gd cos θ)."),
 }
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A list to choose from: the names that a chute knows, and what they mean."""
+    """A list of options: the names of a chute's setting, and their meanings."""
 
     label: str
     options: Mapping[str, str]
     meaning: str
 
 
-_SURFACES = {"free": "free, thinning out for ever", "interface": "interface, free flights above"}
+_SURFACES = {"free": "free, dilute at large heights", "interface": "interface, ballistic grains above"}
 _CLOSURES = {
     "lun": "Lun et al. 1984",
     "lun-fourier": "Lun, heat by Fourier's law alone",
@@ -73,17 +72,17 @@ _CLOSURES = {
 }
 CHOICES = {
     "surface": Choice(
-        "Surface", {name: _SURFACES.get(name, name) for name in SURFACES}, "What is assumed above the colliding grains."
+        "Surface", {name: _SURFACES.get(name, name) for name in SURFACES}, "The condition at the upper surface."
     ),
     "closure": Choice(
-        "Closure", {name: _CLOSURES.get(name, name) for name in LAWS}, "The law of stress and heat flux of the grains."
+        "Closure", {name: _CLOSURES.get(name, name) for name in LAWS}, "The constitutive law of stress and heat flux."
     ),
 }
 
 
 @dataclass(frozen=True)
 class Preset:
-    """A case worth looking at: what it sets of the page's state, and ``words`` on how its numbers are known."""
+    """A case: the part of the page's state that it sets, and ``words`` on the sources of its numbers."""
 
     title: str
     state: Mapping[str, float | str]
@@ -112,7 +111,7 @@ def cases() -> list[Preset]:
 
 
 def _state(one: Case) -> dict[str, float | str]:
-    """What a case says, by the names of the page's state; its grains have a diameter in mm."""
+    """The values of a case, by the names of the page's state; its grains have a diameter in mm."""
     said: dict[str, float | str] = {key: known.value for key, known in one.numbers.items()} | dict(one.names)
     grains = one.scales
     return said if grains is None else said | {"d": round(1e3 * grains.diameter, 12), "rho": grains.density}
@@ -121,7 +120,7 @@ def _state(one: Case) -> dict[str, float | str]:
 def _known(one: Case) -> str:
     numbers = {**one.numbers, **one.grains}
     guessed = [key for key, known in numbers.items() if known.how == GUESSED]
-    told = f" Guessed: {', '.join(guessed)}; put your own in their place." if guessed else ""
+    told = f" Guessed: {', '.join(guessed)}; replace them by your own values." if guessed else ""
     return f"{one.name}: {one.description}.{told}"
 
 
@@ -144,7 +143,7 @@ def read(query: Query, *, other: tuple[str, ...] = (), optional: tuple[str, ...]
     if missing:
         raise InputError(f"missing {', '.join(missing)}: for example {missing[0]}={_BASE.get(missing[0], 'slope')}")
     if runs_code(given["closure"]):
-        raise InputError("closure: a page may not run files: take one by its name, with parameters as name:key=value")
+        raise InputError("closure: a page runs no files: give the name of a law, with parameters as name:key=value")
     chute: dict[str, Any] = {
         long: given[short] if short in _DEFAULTS else number_in(short, given[short])
         for short, long in PARAMETERS.items()
@@ -172,6 +171,25 @@ def place(name: str, given: Query, count: int) -> int:
     return int(given[name])
 
 
+#: Characters of the name of a file that is sent, at most.
+_LONGEST_NAME = 200
+
+
+def file_name(given: Query) -> str:
+    """The name of a file that was sent, without folders.
+
+    Raises:
+        InputError: for a query with other names, or a file of another kind.
+    """
+    unknown = next((name for name in given if name not in ("name", "content", "slope", *GRAINS)), None)
+    if unknown is not None:
+        raise InputError(f"unknown parameter {unknown[:40]!r}")
+    name = re.split(r"[/\\]", given.get("name", ""))[-1]
+    if not name.lower().endswith((".csv", ".nc")) or not name.isprintable() or len(name) > _LONGEST_NAME:
+        raise InputError(f"{shown(name)}: must be a file .csv or .nc")
+    return name
+
+
 def scales(given: Query) -> Scales | None:
     """The scales of the grains of a query, or None where it names none.
 
@@ -190,10 +208,10 @@ def scales(given: Query) -> Scales | None:
 
 @dataclass(frozen=True)
 class ColumnAsked:
-    """A column of the map: the chute, the two parameters across and up, the place (share of the outer axis), and
+    """A column of the map: the chute, the two parameters across and up, the place (fraction of the outer axis), and
     values of the inner parameter (``near``) at which the classes of the columns beside it change.
 
-    A ``coarse`` column is one to look at while sliders move. The chute has the axes' own parameters at the low ends of
+    A ``coarse`` column is a preview while sliders move. The chute has the axes' own parameters at the low ends of
     their ranges.
     """
 
@@ -205,7 +223,7 @@ class ColumnAsked:
     coarse: bool = False
 
 
-#: Values near which the classes of a column are looked at closely, at most.
+#: Largest number of values near which a column is classified on a finer grid.
 MOST_NEAR = 32
 
 

@@ -1,4 +1,4 @@
-"""What one sees on the page, said in words."""
+"""Sentences that describe what the page shows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
 
 if TYPE_CHECKING:
-    from chuteflow.explorer.growth import Verdict
+    from chuteflow.explorer.growth import FlowStability
 
 _COUNTS = ("No flow carries", "One flow carries", "Two flows share", "Three flows share", "Four flows share")
 _INVERTED = ", densest above its base"
@@ -36,7 +36,7 @@ def kinds(flow: Flow) -> str:
 
 
 def of_flows(found: FlowSet, flux: float, scales: Scales | None) -> str:
-    """How many flows carry a flux and what tells them apart, or why there is none."""
+    """How many flows carry a flux and how they differ, or why there is none."""
     count = len(found)
     lead = _COUNTS[count] if count < len(_COUNTS) else f"{count} flows share"
     amount = f"Q = {_amount('mass_flux', flux, found.chute, scales)}"
@@ -57,8 +57,8 @@ def of_curve(found: Curve, scales: Scales | None) -> str:
     return f"{says[0].upper()}{says[1:]}."
 
 
-def of_stability(known: Verdict, chute: Chute, scales: Scales | None) -> str:
-    """Whether a flow is stable, and against what."""
+def of_stability(known: FlowStability, chute: Chute, scales: Scales | None) -> str:
+    """The stability of a flow, and its fastest growing wave."""
     if known.state == "unknown":
         return f"not known whether it is stable: {known.reason}"
     wave = known.fastest
@@ -68,8 +68,8 @@ def of_stability(known: Verdict, chute: Chute, scales: Scales | None) -> str:
     return says if wave.length is None else f"{says}, wavelength {_length(wave.length, chute, scales)}"
 
 
-def of_waves(known: Verdict, chute: Chute, scales: Scales | None) -> str:
-    """Which waves were looked at."""
+def of_waves(known: FlowStability, chute: Chute, scales: Scales | None) -> str:
+    """Which wavelengths were examined."""
     if known.searched is None:
         return ""
     shortest, longest = (_length(length, chute, scales) for length in known.searched)

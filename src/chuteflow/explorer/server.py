@@ -1,7 +1,9 @@
-"""The server of the explorer: the page, its parts, and its questions handed to the scheduler."""
+"""The server of the explorer: it serves the page and its files, and passes questions to the scheduler."""
 
 from __future__ import annotations
 
+import asyncio
+import base64
 import json
 import socket
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
@@ -26,12 +28,14 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-#: Names of this machine that no other can reach it by.
+#: Names by which only this machine reaches itself.
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 PAGE = Path(__file__).parent / "page"
 
 
 _LONGEST_QUERY = 1000
+#: Where a file of measurements is sent to, the bytes that it may have, and seconds within which it must have come.
+DATA, LARGEST_FILE, _SENT_WITHIN = "/data", 2_000_000, 10.0
 _HEADERS = {
     b"content-security-policy": b"default-src 'self'; img-src 'self' data: blob:; style-src 'self'; "
     b"frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
@@ -42,7 +46,8 @@ _HEADERS = {
 
 
 class Guard:
-    """Refuses requests for another host, from pages of another, longer than any of ours, or that change something."""
+    """Refuses requests for other hosts, from pages of other hosts, with long queries or with methods other than GET,
+    and POST where a file is sent."""
 
     def __init__(self, app: ASGIApp, hosts: Sequence[str] | None) -> None:
         self._app = app
@@ -69,8 +74,8 @@ class Guard:
             return _error(400, f"host {host[:80]!r} is not served: ask for {' or '.join(self._hosts)}")
         if headers.get(b"sec-fetch-site") == "cross-site" and headers.get(b"sec-fetch-mode") != "navigate":
             return _error(403, "pages of other servers are not answered")
-        if scope["method"] not in ("GET", "HEAD"):
-            return _error(405, f"{scope['method'][:20]} is not served: GET alone")
+        if scope["method"] not in (("POST",) if scope["path"] == DATA else ("GET", "HEAD")):
+            return _error(405, f"{scope['method'][:20]} is not served here")
         if len(scope["query_string"]) > _LONGEST_QUERY:
             return _error(414, f"the query is longer than {_LONGEST_QUERY} characters")
         return None
@@ -83,11 +88,14 @@ def host_of(header: str) -> str:
 
 
 def application(
-    hosts: Sequence[str] | None = LOOPBACK, compute: Compute = answer, data: Sequence[Mapping[str, Any]] = ()
+    hosts: Sequence[str] | None = LOOPBACK,
+    compute: Compute = answer,
+    data: Sequence[Mapping[str, Any]] = (),
+    first: Mapping[str, Any] | None = None,
 ) -> Starlette:
     """The application, for requests to one of ``hosts``, or to any for None; its state has the ``scheduler``.
 
-    The page draws ``data``, what was measured, behind the flows.
+    The page draws ``data``, what was measured, behind the flows; ``first`` is the state in which it opens.
     """
     scheduler = Scheduler(compute)
 
@@ -105,18 +113,27 @@ def application(
                 return _error(400, f"{repeated[:40]!r} is given several times: give it once")
             client = (request.client.host, request.client.port) if request.client else ("", 0)
             given = await scheduler.ask(question, request.query_params, client, request.is_disconnected)
-            return _response(given, told=request.headers.get("x-status") == "in-answer")
+            return _response(given, in_answer=_in_answer(request))
 
         return respond
 
-    async def told(_: Request) -> Response:
-        return JSONResponse(about(data))
+    async def read(request: Request) -> Response:
+        content = await _body(request)
+        if content is None:
+            return _error(413, f"the file has more than {LARGEST_FILE / 1e6:g} MB, or took too long to be sent")
+        query = dict(request.query_params) | {"content": base64.b64encode(content).decode()}
+        client = (request.client.host, request.client.port) if request.client else ("", 0)
+        return _response(await scheduler.ask("data", query, client), in_answer=_in_answer(request))
+
+    async def metadata(_: Request) -> Response:
+        return JSONResponse(about(data, first))
 
     served = Starlette(
         routes=[
             Route("/", _page),
-            Route("/about", told),
-            *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS),
+            Route("/about", metadata),
+            *(Route(f"/ask/{question}", asked(question)) for question in QUESTIONS if question != "data"),
+            Route(DATA, read, methods=["POST"]),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
         middleware=[Middleware(Guard, hosts=hosts)],
@@ -127,8 +144,8 @@ def application(
     return served
 
 
-def bound(host: str, port: int | None) -> socket.socket:
-    """A socket that listens at ``host``, at ``port`` or at 8765 or the next free one.
+def bind_socket(host: str, port: int | None) -> socket.socket:
+    """Open a socket that listens at ``host``, at ``port`` or at 8765 or the next free one.
 
     Raises:
         InputError: where that is impossible.
@@ -154,16 +171,35 @@ def bound(host: str, port: int | None) -> socket.socket:
     raise InputError(f"cannot listen at {host} port {wanted[0]}: {problem}; try --port 0 for any free one")
 
 
+async def _body(request: Request) -> bytes | None:
+    """The file that is sent, or None where it is too large or does not come."""
+    content = bytearray()
+    try:
+        async with asyncio.timeout(_SENT_WITHIN):
+            async for part in request.stream():
+                content += part
+                if len(content) > LARGEST_FILE:
+                    return None
+    except TimeoutError:
+        return None
+    return bytes(content)
+
+
+def _in_answer(request: Request) -> bool:
+    """Whether the status of a failure is wanted within the answer."""
+    return request.headers.get("x-status") == "in-answer"
+
+
 async def _page(_: Request) -> Response:
     return FileResponse(PAGE / "index.html")
 
 
-def _response(given: Answer, told: bool) -> Response:
-    """The answer with its status; one that is no success is ``told`` in the answer itself, if that is wanted.
+def _response(given: Answer, in_answer: bool) -> Response:
+    """The response with the status of the answer, or with status 200 and the status of a failure within it.
 
-    Browsers report every other status as an error of the page, which a refusal is not.
+    The page asks for the latter: browsers report every failure status as an error of the page.
     """
-    if told and given.status >= 400:
+    if in_answer and given.status >= 400:
         return JSONResponse(json.loads(given.body) | {"status": given.status})
     headers = {} if given.name is None else {"content-disposition": f'attachment; filename="{given.name}"'}
     if given.status == 503:

@@ -17,16 +17,16 @@ from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.about import about
 from chuteflow.explorer.contents import curve_content, limits_passed, short
 from chuteflow.explorer.recipes import recipes
-from chuteflow.explorer.sampled import FIELDS, Deviation, SampledBranch, SampledCurve, budget, sampled
+from chuteflow.explorer.sampled import FIELDS, Deviation, SampledBranch, SampledCurve, budget, sample_curve
 from chuteflow.io import contract, words
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.quantities import Scales
 
 PAGE = Path(__file__).parent / "page"
-#: Flows on the longest branch: as many as the file has room for, and bytes that it may have.
+#: Flows on the longest branch: as many as fit into the file, and bytes that it may have.
 _POINTS, _LARGEST = (240, 160, 100, 60), 1_900_000
-#: Fields are kept as whole numbers up to this one, which stands for their largest value in a flow.
+#: Fields are stored as integers up to this one, which stands for their largest value in a flow.
 _WHOLE = 100_000
 #: Nothing is loaded from anywhere.
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -47,25 +47,27 @@ def standalone(
     """The page of ``chute`` as HTML, at first at ``flux``; in SI units where there are ``scales``. It draws ``data``,
     what was measured, behind the flows.
 
-    It has every branch in the range of surface temperatures and hold-ups, and says how far what it interpolates
-    is off at flows solved between.
+    It has every branch in the range of surface temperatures and hold-ups, and states the error of its interpolation
+    at flows solved between.
 
     Raises:
         InputError: for a range out of bounds.
         SolveError: where a branch could not be followed, or where the file became too large.
     """
     for points in _POINTS:
-        found = sampled(chute, points, surface_temperature, largest_holdup)
-        page = _html(_kept(found, flux, scales, data))
+        found = sample_curve(chute, points, surface_temperature, largest_holdup)
+        page = _html(_content(found, flux, scales, data))
         if len(page.encode()) <= _LARGEST:
             return page
     raise SolveError("the curve has too many branches for one page: narrow the range that is searched")
 
 
-# --- what is kept in the page -----------------------------------------------------------------------------------------
+# --- the data of the page ---------------------------------------------------------------------------------------------
 
 
-def _kept(found: SampledCurve, flux: float, scales: Scales | None, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _content(
+    found: SampledCurve, flux: float, scales: Scales | None, data: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     chute = found.curve.chute
     return {
         "about": _about(found.curve, flux, scales) | {"data": list(data)},
@@ -74,7 +76,7 @@ def _kept(found: SampledCurve, flux: float, scales: Scales | None, data: Sequenc
         "limits": {"words": [limits_passed(branch) for branch in found.curve.branches]},
         "branches": [_branch(one) for one in found.branches],
         "recipes": recipes(chute, FLUX_PLACE, scales),
-        "says": list(_told(found, scales)),
+        "says": list(_notes(found, scales)),
         "error": max([found.deviation.place, found.deviation.budget, *found.deviation.fields.values()]),
     }
 
@@ -84,10 +86,10 @@ FLUX_PLACE = "{flux}"
 
 
 def _about(curve: Curve, flux: float, scales: Scales | None) -> dict[str, Any]:
-    """What the page is told: one case, and the flux as the only control."""
+    """Metadata for the page: one case, and the flux as the only control."""
     fluxes = [float(q) for branch in curve.branches for q in branch.mass_flux] or [*queries.FLUX_RANGE]
     control = replace(queries.CONTROLS["Q"], low=_rounded_down(min(fluxes)), high=-_rounded_down(-max(fluxes)))
-    state = contract.chute_object(curve.chute) | {"Q": min(max(flux, control.low), control.high), "judge": ""}
+    state = contract.chute_object(curve.chute) | {"Q": min(max(flux, control.low), control.high), "stability": ""}
     if scales is not None:
         state |= {"si": "1", "d": 1e3 * scales.diameter, "rho": scales.density}
     preset = queries.Preset("this chute", state)
@@ -121,54 +123,55 @@ def _branch(one: SampledBranch) -> dict[str, Any]:
     }
 
 
-def _told(found: SampledCurve, scales: Scales | None) -> list[str]:
-    """What was searched, what is kept, and how exact it is."""
+def _notes(found: SampledCurve, scales: Scales | None) -> list[str]:
+    """What was searched, what the page holds, and its error."""
     curve = found.curve
     says = [f"{words.chute(curve.chute)}."]
     if scales is not None:
         says.append(f"{words.scales(scales)}.")
-    says.append(f"{words.searched(curve.searched, curve.chute, scales)}. Outside of this range nothing is known.")
+    says.append(f"{words.searched(curve.searched, curve.chute, scales)}. Outside this range nothing is known.")
     if curve.incomplete:
         says.append(words.in_own_units(f"There may be more flows: {curve.incomplete}", scales) + ".")
     if curve.branches:
-        says.append(_exactness(found))
+        says.append(_accuracy(found))
     return says
 
 
-def _exactness(found: SampledCurve) -> str:
-    kept, off = sum(len(one.branch.flows) for one in found.branches), found.deviation
+def _accuracy(found: SampledCurve) -> str:
+    stored, errors = sum(len(one.branch.flows) for one in found.branches), found.deviation
     return (
-        f"The page keeps {kept} solved flows and interpolates between them. It was held against {off.flows} flows "
-        f"solved in between: {_said(off)}. Where Q is as near to a fold as that, a flow too many or too few may be "
-        "shown. Names, kinds and limits of the theory are those of the nearest solved flow. Stability was not examined."
+        f"The page holds {stored} solved flows and interpolates between them. It was compared with {errors.flows} "
+        f"flows solved between them: {_errors_in_words(errors)}. Where Q is as near to a fold as that, a flow too many "
+        "or too few may be shown. Names, kinds and limits of the theory are those of the nearest solved flow. "
+        "Stability was not examined."
     )
 
 
-def _said(off: Deviation) -> str:
+def _errors_in_words(errors: Deviation) -> str:
     symbols = {"nu": "volume fraction", "T": "granular temperature", "u": "velocity"}
-    fields = ", ".join(f"{name} by {_percent(off.fields[symbol])}" for symbol, name in symbols.items())
-    rates = max(off.fields["production"], off.fields["dissipation"])
+    fields = ", ".join(f"{_percent(errors.fields[symbol])} in the {name}" for symbol, name in symbols.items())
+    rates = max(errors.fields["production"], errors.fields["dissipation"])
     return (
-        f"Q, h, M and T_surface are off by {_percent(off.place)} at most, and profiles, as a share of their largest "
-        f"value, {fields}, and rates of energy by {_percent(rates)}"
+        f"errors are at most {_percent(errors.place)} in Q, h, M and T_surface, {fields}, each relative to the largest "
+        f"value of the profile, and {_percent(rates)} in rates of energy"
     )
 
 
-def _percent(share: float) -> str:
-    """A share with one digit, rounded up."""
-    return f"{-_rounded_down(-100.0 * share, 1):g} %" if share else "0 %"
+def _percent(fraction: float) -> str:
+    """A fraction with one digit, rounded up."""
+    return f"{-_rounded_down(-100.0 * fraction, 1):g} %" if fraction else "0 %"
 
 
 # --- the file ---------------------------------------------------------------------------------------------------------
 
 
-def _html(kept: dict[str, Any]) -> str:
+def _html(content: dict[str, Any]) -> str:
     page = (PAGE / "index.html").read_text(encoding="utf-8")
     icon = (PAGE / "icon.svg").read_text(encoding="utf-8")
     # No "<" in the data can end the element that holds it.
-    data = json.dumps(kept, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    data = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     for link, instead in (
-        ('<html lang="en">', '<html lang="en" class="kept">'),
+        ('<html lang="en">', '<html lang="en" class="standalone">'),
         (
             '<meta charset="utf-8">',
             f'<meta charset="utf-8">\n<meta http-equiv="content-security-policy" content="{_POLICY}">',
@@ -181,7 +184,8 @@ def _html(kept: dict[str, Any]) -> str:
         ('<script type="module" src="page/main.js"></script>\n', ""),
         (
             "</body>",
-            f'<script type="application/json" id="kept">{data}</script>\n<script>\n{bundle("main")}</script>\n</body>',
+            f'<script type="application/json" id="standalone-data">{data}</script>\n'
+            f"<script>\n{bundle('main')}</script>\n</body>",
         ),
     ):
         if page.count(link) != 1:

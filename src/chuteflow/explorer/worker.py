@@ -1,4 +1,4 @@
-"""A process that computes answers, one at a time, each within a bounded time."""
+"""A worker process that computes answers, one at a time, each within a time limit."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from chuteflow.processes import starting_processes
 
-# A process that starts imports this module first: what computes is imported later, by who watches over it.
+# A starting process imports this module first; the code that computes is imported later, under the watchdog.
 if TYPE_CHECKING:
     from chuteflow.explorer.answers import Answer
 
-#: Computes the answer to a question with its query; it runs in the worker, which finds it by its module and name.
+#: Computes the answer to a question with its query, in the worker, which imports it by its module and name.
 Compute = Callable[[str, Mapping[str, str]], "Answer"]
-#: Questions with their queries that a worker answers once as it starts, so that what they need is loaded, and compiled
-#: where this machine has not done that before. No limit counts it.
+#: Questions with their queries that a worker answers once as it starts, so that code is loaded, and compiled where it
+#: is not cached. No time limit applies.
 Questions = Sequence[tuple[str, Mapping[str, str]]]
 
-#: Seconds between two looks at the time a computation has taken, and between two attempts to interrupt it.
-_LOOK, _AGAIN = 0.05, 0.25
-#: Seconds that a computation may take to end once it is interrupted, and a process to start, which may have to compile.
+#: Seconds between two checks of the time that a computation has taken, and between two attempts to interrupt it.
+_POLL, _RETRY = 0.05, 0.25
+#: Seconds that a computation may take to end once it is interrupted, and that a process may take to start and compile.
 _GRACE, _START = 1.0, 300.0
 T = TypeVar("T")
 
@@ -44,19 +44,19 @@ class Limits:
     clock: float
 
 
-class Ended(Enum):
+class NoAnswer(Enum):
     """Why there is no answer."""
 
     TOO_LONG = "the computation took longer than its limit"
-    BUSY = "the time by the clock was up before the computation had its share of the processor"
-    TAKEN_BACK = "nobody waits for the answer"
-    BROKEN = "the process ended"
+    BUSY = "the time limit by the clock passed before the computation had used its processor time"
+    CANCELLED = "the request was cancelled"
+    CRASHED = "the process ended"
 
 
 class _Interrupt(BaseException):
     """Raised within a computation to end it; nothing that computes catches it."""
 
-    def __init__(self, why: Ended) -> None:
+    def __init__(self, why: NoAnswer) -> None:
         super().__init__(why)
         self.why = why
 
@@ -78,19 +78,19 @@ class Worker:
 
     Args:
         nice: by how much the priority of the process is lower than that of this one, 0 to 19.
-        warm: questions that it answers as it starts.
+        warm_up: questions that it answers as it starts.
         compute: what computes an answer, a function of a module.
     """
 
-    def __init__(self, *, nice: int = 0, warm: Questions = (), compute: Compute) -> None:
+    def __init__(self, *, nice: int = 0, warm_up: Questions = (), compute: Compute) -> None:
         self._nice = nice
-        self._warm = warm
+        self._warm_up = warm_up
         self._compute = compute
         self._process: SpawnProcess | None = None
         self._pipe: Pipe | None = None
         self._control: Pipe | None = None
         self._number = 0
-        # Which question is in work, so that another is never taken back in its place.
+        # The question that is being computed, so that no other is cancelled in its place.
         self._lock = threading.Lock()
         self._ticket: object | None = None
         self._closed = False
@@ -114,29 +114,29 @@ class Worker:
         except (EOFError, OSError):
             self._stop()
 
-    def put(self, ticket: object, question: str, query: Mapping[str, str], limits: Limits) -> Answer | Ended:
+    def put(self, ticket: object, question: str, query: Mapping[str, str], limits: Limits) -> Answer | NoAnswer:
         """The answer, waited for in this thread, or why there is none."""
         self.start()
         with self._lock:
             if self._pipe is None or self._closed:
-                return Ended.BROKEN
+                return NoAnswer.CRASHED
             self._ticket = ticket
             self._number += 1
         try:
             self._pipe.send((self._number, question, dict(query), limits))
             if self._pipe.poll(limits.clock + _GRACE):
                 return self._pipe.recv()
-            ended = Ended.TOO_LONG
+            ended = NoAnswer.TOO_LONG
         except (EOFError, OSError):
-            ended = Ended.BROKEN
+            ended = NoAnswer.CRASHED
         finally:
             with self._lock:
                 self._ticket = None
         self._stop()
         return ended
 
-    def take_back(self, ticket: object) -> None:
-        """End the computation of the question that ``put`` was given with this ticket, if it is in work."""
+    def cancel(self, ticket: object) -> None:
+        """End the computation of the question that ``put`` was given with this ticket, if it is being computed."""
         with self._lock:
             if self._ticket is ticket and self._control is not None:
                 try:
@@ -145,7 +145,7 @@ class Worker:
                     return  # the process has ended, which ``put`` notices
 
     def close(self) -> None:
-        """End the process for good; a question in work is lost."""
+        """End the process for good; a running computation is lost."""
         with self._lock:
             self._closed = True
             if self._process is not None:
@@ -153,19 +153,26 @@ class Worker:
 
     def _launch(self) -> Pipe:
         context = multiprocessing.get_context("spawn")
-        near, far = context.Pipe()
-        control, heard = context.Pipe()
-        arguments = far, heard, self._nice, self._warm, self._compute.__module__, self._compute.__qualname__
+        parent_end, child_end = context.Pipe()
+        control, child_control = context.Pipe()
+        arguments = (
+            child_end,
+            child_control,
+            self._nice,
+            self._warm_up,
+            self._compute.__module__,
+            self._compute.__qualname__,
+        )
         process = context.Process(target=_serve, args=arguments, daemon=True)
         with starting_processes():
             process.start()
-        far.close()
-        heard.close()
+        child_end.close()
+        child_control.close()
         with self._lock:
-            self._process, self._pipe, self._control = process, near, control
+            self._process, self._pipe, self._control = process, parent_end, control
             if self._closed:
                 process.kill()
-        return near
+        return parent_end
 
     def _stop(self) -> None:
         with self._lock:
@@ -179,32 +186,32 @@ class Worker:
                 pipe.close()
 
 
-def _serve(pipe: Pipe, control: Pipe, nice: int, warm: Questions, module: str, name: str) -> None:
+def _serve(pipe: Pipe, control: Pipe, nice: int, warm_up: Questions, module: str, name: str) -> None:
     """Answer until the other end closes."""
-    watch = _Watch(control)
+    watchdog = _Watchdog(control)
     if hasattr(os, "nice"):
         os.nice(nice)
 
     def loaded() -> Compute:
         compute = getattr(import_module(module), name)
-        for question, query in warm:
+        for question, query in warm_up:
             compute(question, query)
         return compute
 
-    compute = watch.bounded(0, Limits(math.inf, math.inf), loaded)
-    if isinstance(compute, Ended):
+    compute = watchdog.bounded(0, Limits(math.inf, math.inf), loaded)
+    if isinstance(compute, NoAnswer):
         return
     try:
         pipe.send("ready")
         while True:
             number, question, query, limits = pipe.recv()
-            pipe.send(watch.bounded(number, limits, partial(compute, question, query)))
+            pipe.send(watchdog.bounded(number, limits, partial(compute, question, query)))
     except (EOFError, OSError):
         return
 
 
-class _Watch:
-    """A thread that interrupts the main one when a computation has taken too long or is taken back."""
+class _Watchdog:
+    """A thread that interrupts the main one when a computation has taken too long or is cancelled."""
 
     def __init__(self, control: Pipe) -> None:
         self._control = control
@@ -213,15 +220,15 @@ class _Watch:
         self._limits = Limits(0.0, 0.0)
         self._began = (0.0, 0.0)
         # The question that is to end, by its number so that the next one never ends in its place.
-        self._due: tuple[int, Ended] | None = None
+        self._due: tuple[int, NoAnswer] | None = None
         # Ctrl-C is for the server alone. The same signal interrupts a computation, on every system.
-        signal.signal(signal.SIGINT, self._heard)
+        signal.signal(signal.SIGINT, self._on_signal)
         self._hook, sys.unraisablehook = sys.unraisablehook, self._unraisable
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         threading.Thread(target=self._run, daemon=True).start()
 
-    def bounded(self, number: int, limits: Limits, compute: Callable[[], T]) -> T | Ended:
+    def bounded(self, number: int, limits: Limits, compute: Callable[[], T]) -> T | NoAnswer:
         """What ``compute`` returns, or why it was interrupted."""
         self._limits, self._began = limits, (time.process_time(), time.monotonic())
         try:
@@ -240,12 +247,12 @@ class _Watch:
                 return self._due[1]
             raise
 
-    def _heard(self, *_: object) -> None:
+    def _on_signal(self, *_: object) -> None:
         if self._busy.is_set() and self._due is not None and self._due[0] == self._number:
             raise _Interrupt(self._due[1])
 
     def _unraisable(self, given: Any) -> None:
-        """An interrupt that is lost in a finaliser needs no words: another follows."""
+        """Ignore an interrupt that is lost in a finaliser: another follows."""
         if not issubclass(given.exc_type, _Interrupt):
             self._hook(given)
 
@@ -253,8 +260,8 @@ class _Watch:
         while self._busy.wait():
             number = self._number
             try:
-                if self._control.poll(_LOOK) and self._control.recv() == number:
-                    self._due = number, Ended.TAKEN_BACK
+                if self._control.poll(_POLL) and self._control.recv() == number:
+                    self._due = number, NoAnswer.CANCELLED
             except (EOFError, OSError):
                 os._exit(1)  # the server has ended
             overdue = self._overdue()
@@ -262,14 +269,14 @@ class _Watch:
                 self._due = number, overdue
             if self._due is not None and self._due[0] == self._number:
                 _interrupt_main_thread()
-                # An exception within a finaliser, for one, is lost: until the computation ends, there are more.
-                time.sleep(_AGAIN)
+                # An exception raised within a finaliser is lost, so interrupts are repeated until the computation ends.
+                time.sleep(_RETRY)
 
-    def _overdue(self) -> Ended | None:
+    def _overdue(self) -> NoAnswer | None:
         processor, clock = self._began
         if time.process_time() - processor > self._limits.processor:
-            return Ended.TOO_LONG
-        return Ended.BUSY if time.monotonic() - clock > self._limits.clock else None
+            return NoAnswer.TOO_LONG
+        return NoAnswer.BUSY if time.monotonic() - clock > self._limits.clock else None
 
 
 def _interrupt_main_thread() -> None:

@@ -5,8 +5,6 @@ Turning points stand in their places along a boundary in tables, and apart in JS
 
 from __future__ import annotations
 
-import os
-from io import BytesIO
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,7 +14,7 @@ from chuteflow.io import contract
 from chuteflow.io.contract import PLACE, SHORT, finite, place_object, places_object
 from chuteflow.io.csv_file import write_columns
 from chuteflow.io.datasets import dataset
-from chuteflow.io.writing import as_text, require_writable, write_whole
+from chuteflow.io.writing import as_text
 from chuteflow.steady.quantities import Scales
 
 
@@ -32,8 +30,7 @@ def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[
         "range": list(found.bounds),
         "boundaries": [_boundary(boundary, second, scales) for boundary in found],
         "searched": {
-            "T_surface": list(found.searched.surface_temperature),
-            "M_max": found.searched.largest_holdup,
+            **contract.searched_object(found.chute, found.searched),
             second: list(found.sampled),
             "skipped": list(found.skipped),
         },
@@ -41,19 +38,6 @@ def boundaries_object(found: BoundarySet, scales: Scales | None = None) -> dict[
         "incomplete": found.incomplete,
         **contract.units_object(scales, PLACE),
     }
-
-
-def save(found: BoundarySet, path: str | os.PathLike[str], *, scales: Scales | None = None) -> None:
-    """Write boundaries to ``path``: .nc, .csv or .json, whole or not at all; in SI units where ``scales`` are given.
-
-    Raises:
-        InputError: for another ending, or a file that cannot be written.
-    """
-    write = {".json": _write_json, ".csv": _write_csv, ".nc": _write_netcdf}
-    suffix = require_writable(path, tuple(write))
-    stream = BytesIO()
-    write[suffix](found, stream, scales)
-    write_whole(path, stream.getvalue())
 
 
 def _boundary(boundary: Boundary, second: str, scales: Scales | None) -> dict[str, Any]:
@@ -91,7 +75,10 @@ def _write_csv(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> N
 
 
 def _write_netcdf(found: BoundarySet, stream: BinaryIO, scales: Scales | None) -> None:
-    from chuteflow.io.netcdf_file import create
+    from chuteflow.io.netcdf_file import write_groups
 
-    with create(stream) as file:
-        dataset(found, scales).write(file)
+    write_groups(stream, dataset(found, scales))
+
+
+#: What writes boundaries to a stream, by the ending of the file.
+WRITERS = {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}

@@ -7,19 +7,19 @@ whose numbers hold where the file does not say others.
 
 from __future__ import annotations
 
-import math
 import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from chuteflow.amounts import positive_amount
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
-from chuteflow.io.units import read_si
 from chuteflow.parameters import BY_KEY
-from chuteflow.steady.cases import GRAINS, Case, CaseNumber, case, nearest_names
+from chuteflow.steady.cases import Case, CaseNumber, case, nearest_names
 from chuteflow.steady.chute import slope_of
+from chuteflow.steady.quantities import GRAINS
 
 #: Names of the model.
 _NAMES = ("surface", "closure", "base")
@@ -84,7 +84,7 @@ def _case(name: str, given: dict[str, Any]) -> Case:
             raise InputError("slope and angle: give one of them, not both")
         own["slope"] = CaseNumber(slope_of(given["angle"]))
     names = {one: _text(one, given[one]) for one in _NAMES if one in given}
-    grains = {one: CaseNumber(_amount(one, given[one])) for one in GRAINS if one in given}
+    grains = {one: CaseNumber(positive_amount(one, given[one], GRAINS[one])) for one in GRAINS if one in given}
     return Case(
         name,
         f"{start.description or 'the chute'} of {name}",
@@ -92,13 +92,6 @@ def _case(name: str, given: dict[str, Any]) -> Case:
         {**start.names, **names},
         {**start.grains, **grains},
     )
-
-
-def _amount(name: str, value: Any) -> float:
-    found = read_si(name, value, GRAINS[name]) if isinstance(value, str) else number(name, value)
-    if not (math.isfinite(found) and found > 0.0):
-        raise InputError(f"{name} = {shown(value)}: must be a positive number")
-    return found
 
 
 def _text(name: str, value: Any) -> str:

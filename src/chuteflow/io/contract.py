@@ -53,7 +53,7 @@ def curve_object(curve: Curve, scales: Scales | None = None) -> dict[str, Any]:
     """What ``chuteflow curve --json`` prints."""
     return {
         "chute": chute_object(curve.chute),
-        "branches": [_branch(curve.chute, branch, scales) for branch in curve.branches],
+        "branches": [_branch(branch, scales) for branch in curve.branches],
         "counts": [_count(curve.chute, count, scales) for count in flux_counts(curve)],
         "searched": searched_object(curve.chute, curve.searched, scales),
         "closure": closure_object(curve.chute),
@@ -171,16 +171,12 @@ def _numbers(flow: Flow, names: Iterable[str], scales: Scales | None) -> dict[st
     return {NUMBERS[name].symbol: finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in names}
 
 
-def _branch(chute: Chute, branch: Branch, scales: Scales | None) -> dict[str, Any]:
-    arrays = {
-        NUMBERS[name].symbol: [finite(value * factor(name, chute, scales)) for value in getattr(branch, name)]
-        for name in PLACE
-    }
-    special = [{"kind": point.kind, **_numbers(point.flow, PLACE, scales)} for point in branch.special]
+def _branch(branch: Branch, scales: Scales | None) -> dict[str, Any]:
+    special = [{"kind": point.kind, **place_object(point.flow, scales)} for point in branch.special]
     known = [flow.validity for flow in branch.flows]
     validity: dict[str, Any] = {name: [finite(getattr(one, name)) for one in known] for name in VALIDITY}
     validity["words"] = [list(one.words) for one in known]
-    return {**arrays, "validity": validity, "special": special, "ends": list(branch.ends)}
+    return {**places_object(branch.flows, scales), "validity": validity, "special": special, "ends": list(branch.ends)}
 
 
 def _count(chute: Chute, count: FlowCount, scales: Scales | None) -> dict[str, Any]:

@@ -7,8 +7,9 @@ places. The comments above the table are for people; those below it hold the unk
 from __future__ import annotations
 
 import csv
+import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
@@ -19,7 +20,7 @@ from chuteflow.branches.results import Curve
 from chuteflow.checks import shown
 from chuteflow.errors import InputError
 from chuteflow.io import contract, records
-from chuteflow.io.contract import factor, finite
+from chuteflow.io.contract import factor
 from chuteflow.io.records import HEIGHTS, KIND_OF, Result, Row
 from chuteflow.io.references import PAPER, TITLES, numbers_are
 from chuteflow.io.writing import as_text
@@ -89,11 +90,18 @@ def require_columns(lines: Sequence[str]) -> None:
             raise InputError(f"it has the column {name[:40]!r} {times} times")
 
 
+def write_rows(file: TextIO, rows: Iterable[Sequence[Any]]) -> None:
+    """Rows of a table, each number in full, and an empty cell for None and for what is not finite."""
+    csv.writer(file, lineterminator="\n").writerows([_cell(value) for value in row] for row in rows)
+
+
+def _cell(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def write_columns(file: TextIO, columns: Mapping[str, Any]) -> None:
-    """Columns of equal size by name as the rows of a table, each value in full."""
-    table = csv.writer(file, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows(zip(*(np.ravel(values).tolist() for values in columns.values()), strict=True))
+    """Columns of equal size by name as the rows of a table."""
+    write_rows(file, [list(columns), *zip(*(np.ravel(values).tolist() for values in columns.values()), strict=True)])
 
 
 def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
@@ -120,23 +128,26 @@ def _comments(result: Result, scales: Scales | None) -> Iterator[str]:
 
 
 def _write_table(file: TextIO, result: Result, found: Sequence[Row], scales: Scales | None) -> None:
-    table = csv.writer(file, lineterminator="\n")
+    write_rows(file, _rows(result, found, scales))
+
+
+def _rows(result: Result, found: Sequence[Row], scales: Scales | None) -> Iterator[Sequence[Any]]:
     if isinstance(result, Curve):
-        table.writerow(["branch", "special", *NUMBERS, *_KINDS])
-        table.writerows([row.branch, row.special, *_numbers(row.flow, scales)] for row in found)
+        yield ["branch", "special", *NUMBERS, *_KINDS]
+        yield from ([row.branch, row.special, *_numbers(row.flow, scales)] for row in found)
         return
-    table.writerow(["flow", *FIELDS, *NUMBERS, *_KINDS])
+    yield ["flow", *FIELDS, *NUMBERS, *_KINDS]
     for i, row in enumerate(found):
         profile = row.flow.sampled(HEIGHTS)
         numbers = _numbers(row.flow, scales)
         columns = [getattr(profile, name) * factor(name, row.flow.chute, scales) for name in FIELDS]
         for values in zip(*columns, strict=True):
-            table.writerow([i, *map(float, values), *numbers])
+            yield [i, *map(float, values), *numbers]
 
 
 def _numbers(flow: Flow, scales: Scales | None) -> list[Any]:
-    """The numbers and kinds of a flow; what is not finite is an empty cell."""
-    numbers = [finite(getattr(flow, name) * factor(name, flow.chute, scales)) for name in NUMBERS]
+    """The numbers and kinds of a flow."""
+    numbers = [getattr(flow, name) * factor(name, flow.chute, scales) for name in NUMBERS]
     known = flow.validity
-    limits = [finite(getattr(known, name)) for name in VALIDITY]
-    return [*numbers, flow.interior, flow.density, finite(flow.error), *limits, known.summary, flow.name]
+    limits = [float(getattr(known, name)) for name in VALIDITY]
+    return [*numbers, flow.interior, flow.density, flow.error, *limits, known.summary, flow.name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -88,10 +88,24 @@ class Dataset:
         table = pd.DataFrame(columns)
         return table.set_index([name for name in self.index if name in columns]) if self.index else table
 
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Every variable as a column with one row for each point of all dimensions; flags as words."""
-        sizes = self.sizes
+    def columns(self, order: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
+        """Every variable as a column with one row for each point of all dimensions, the last of ``order``, by default
+        of :attr:`sizes`, changing fastest; flags as words."""
+        sizes = {name: self.sizes[name] for name in order or self.sizes}
         return {name: _spread(one.words, one.dimensions, sizes) for name, one in self.variables.items()}
+
+    def rows(self, headings: Mapping[str, str], order: Sequence[str] = ()) -> Iterator[Sequence[Any]]:
+        """Headings and rows of a table of the variables by the ``headings`` of their columns, see :meth:`columns`."""
+        yield list(headings)
+        columns = self.columns(order)
+        yield from zip(*(columns[name].tolist() for name in headings.values()), strict=True)
+
+    def lists(self, name: str) -> Any:
+        """The values of a variable as nested lists, None for those that are not finite, which JSON cannot hold."""
+        values = self.variables[name].values
+        found = values.astype(object)
+        found[~np.isfinite(values)] = None
+        return found.tolist()
 
     def write(self, group: h5netcdf.Group, inherited: Sequence[str] = ()) -> None:
         """Write all into a group of a NetCDF file, which has the dimensions ``inherited`` from that which it is in."""
@@ -100,6 +114,11 @@ class Dataset:
         for name, one in self.variables.items():
             variable = group.create_variable(name, one.dimensions, one.values.dtype, data=one.values)
             variable.attrs.update(one.attributes)
+
+
+def variable(dimensions: tuple[str, ...], values: Any, long_name: str, unit: str = "1") -> Variable:
+    """A variable that has a description and a unit."""
+    return Variable(dimensions, np.asarray(values), {"long_name": long_name, "units": unit})
 
 
 def flags(

@@ -15,7 +15,7 @@ from chuteflow.branches.lines import in_order
 from chuteflow.branches.results import KINDS, Branch, Curve, FlowSet, FlowSets, Searched
 from chuteflow.errors import InputError
 from chuteflow.io.contract import factor
-from chuteflow.io.dataset import Dataset, Variable, flags
+from chuteflow.io.dataset import Dataset, Variable, flags, variable
 from chuteflow.io.records import HEIGHTS, KIND_OF, Row, rows
 from chuteflow.io.references import PAPER, TITLES, numbers_are
 from chuteflow.maps import KINDS_OF_BOUNDARIES, Domain
@@ -237,10 +237,6 @@ def _described(quantity: Quantity, scales: Scales | None) -> dict[str, str]:
     }
 
 
-def _plain(dimensions: tuple[str, ...], values: Any, long_name: str, unit: str = "1") -> Variable:
-    return Variable(dimensions, np.asarray(values), {"long_name": long_name, "units": unit})
-
-
 def _unit(name: str, scales: Scales | None) -> str:
     return SCALED[name].unit_without_scales if scales is None else SCALED[name].unit
 
@@ -288,12 +284,12 @@ def _along_boundaries(boundaries: Sequence[Boundary], second: str, scales: Scale
     return {
         "boundary": number,
         "special": flags(along, [kind for _, kind, *_ in points], kinds, "kind of turning point", comment),
-        second: _plain(along, [getattr(flow.chute, second) for flow in flows], second),
+        second: variable(along, [getattr(flow.chute, second) for flow in flows], second),
         **{
-            name: _plain(along, _scaled(flows, name, scales), NUMBERS[name].description, _unit(name, scales))
+            name: variable(along, _scaled(flows, name, scales), NUMBERS[name].description, _unit(name, scales))
             for name in PLACE
         },
-        "error": _plain(
+        "error": variable(
             along,
             [error for *_, error in points],
             "estimated relative error of Q, h, M and the second parameter, the largest",
@@ -311,7 +307,7 @@ def _of_domain(result: Domain, scales: Scales | None = None) -> Dataset:
     plane = result.plane
     x, y = plane.x.name, plane.y.name
     variables = {
-        name: _plain((name,), values, f"{name.replace('_', ' ')} of the chute")
+        name: variable((name,), values, f"{name.replace('_', ' ')} of the chute")
         for name, values in ((x, result.x), (y, result.y))
     }
     for name in CLASSES:
@@ -319,7 +315,7 @@ def _of_domain(result: Domain, scales: Scales | None = None) -> Dataset:
         variables[name] = Variable((y, x), values, _class(name))
     index = (y, x)
     if plane.temperatures:
-        variables["temperature"] = _plain(("temperature",), plane.temperatures, "surface temperature")
+        variables["temperature"] = variable(("temperature",), plane.temperatures, "surface temperature")
         there = {"flag_values": np.arange(2, dtype="i1"), "flag_meanings": "no_flow flow"}
         variables["exists_at"] = Variable(
             ("temperature", y, x),
@@ -368,8 +364,8 @@ def outlines(found: Domain) -> Dataset:
     axes = ((found.plane.x.name, points[:, 0]), (found.plane.y.name, points[:, 1]))
     return Dataset(
         {
-            **{name: _plain(along, values, name.replace("_", " ")) for name, values in axes},
-            "line": _plain(along, np.repeat(np.arange(len(lines), dtype="i4"), lengths), "number of the line"),
+            **{name: variable(along, values, name.replace("_", " ")) for name, values in axes},
+            "line": variable(along, np.repeat(np.arange(len(lines), dtype="i4"), lengths), "number of the line"),
             "kind": flags(along, kinds, tuple(KINDS_OF_BOUNDARIES), "kind of boundary", comment),
         },
         {"long_name": "boundaries between classes as lines"},
@@ -384,8 +380,8 @@ def _of_waves(result: WaveMap, scales: Scales | None = None) -> Dataset:
     chute = result.flow.chute
     wave, unit = factor("wavenumber", chute, scales), _unit("wavenumber", scales)
     axes = {
-        "kx": _plain(("kx",), wave * result.kx, "wavenumber along the slope", unit),
-        "ky": _plain(("ky",), wave * result.ky, "wavenumber across the slope", unit),
+        "kx": variable(("kx",), wave * result.kx, "wavenumber along the slope", unit),
+        "ky": variable(("ky",), wave * result.ky, "wavenumber across the slope", unit),
     }
     return Dataset({**axes, **_growth(("kx", "ky"), result, chute, scales)}, chute.as_dict(), ("kx", "ky"))
 
@@ -394,7 +390,7 @@ def _of_waves(result: WaveMap, scales: Scales | None = None) -> Dataset:
 def _of_family(result: FamilyMap, scales: Scales | None = None) -> Dataset:
     chute = result.flows[0].chute
     axes = {
-        "depth_wavenumber": _plain(("depth_wavenumber",), result.depth_wavenumber, "wavenumber times centre of mass"),
+        "depth_wavenumber": variable(("depth_wavenumber",), result.depth_wavenumber, "wavenumber times centre of mass"),
         **{
             name: Variable(("flow",), _scaled(result.flows, name, scales), _described(NUMBERS[name], scales))
             for name in PLACE
@@ -439,7 +435,7 @@ def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
             "stability": Variable((), np.asarray(known)),
             "kind": Variable((), np.asarray("" if mode is None else mode.kind)),
             **{
-                name: _plain(
+                name: variable(
                     (),
                     value * factor(scale.get(name, name), chute, scales),
                     f"{name} of the mode that grows fastest",
@@ -472,7 +468,7 @@ def _of_hot(result: HotModel, scales: Scales | None = None) -> Dataset:
         raise InputError("a hot limit has factors of powers of T_inf: take it without scales")
     plain = {name: value for name, value in result.as_dict().items() if not isinstance(value, list)}
     values = {name: np.asarray(np.nan if value is None else value) for name, value in plain.items()}
-    described = {name: _plain((), value, f"{name} of the hot limit") for name, value in values.items()}
+    described = {name: variable((), value, f"{name} of the hot limit") for name, value in values.items()}
     return Dataset(described, result.chute.as_dict())
 
 
@@ -481,13 +477,13 @@ def _of_hot(result: HotModel, scales: Scales | None = None) -> Dataset:
 
 @dataset.register(Scan)
 def _of_scan(result: Scan, scales: Scales | None = None) -> Dataset:
-    axes = {name: _plain((name,), values, result.description(name)) for name, values in result.axes.items()}
+    axes = {name: variable((name,), values, result.description(name)) for name, values in result.axes.items()}
     by: Callable[[str], Any] = (
         (lambda name: 1.0) if scales is None else (lambda name: result.over_slopes(lambda s: scales.factor(name, s)))
     )
     points = tuple(result.axes)
     variables = {
-        "flows": _plain(points, result.count, "number of flows"),
+        "flows": variable(points, result.count, "number of flows"),
         "state": Variable(points, result.status, {"long_name": "how the search ended", **result.status_flags}),
     }
     for name, values in result.quantities.items():

@@ -63,10 +63,7 @@ def domain_object(found: Domain, most_cells: int = MOST_CELLS) -> dict[str, Any]
         "shares": shares(found),
         "cells": _cells(found) if found.most.size <= most_cells else None,
         "boundaries": [_boundary(one) for one in found.boundaries],
-        "searched": {
-            "T_surface": list(found.searched.surface_temperature),
-            "M_max": found.searched.largest_holdup,
-        },
+        "searched": contract.searched_object(plane.chute, found.searched),
     }
 
 
@@ -205,11 +202,6 @@ def _shares_from(kept: Any) -> tuple[float, ...]:
 # Files
 
 
-def write(found: Domain, stream: BinaryIO, suffix: str) -> None:
-    """Write a map to ``stream`` in the format of ``suffix``: .nc, .csv or .json."""
-    {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}[suffix](found, stream)
-
-
 def read(path: Path) -> Domain | None:
     """The map in a file, .nc, .csv or .json; None where it holds something else.
 
@@ -221,7 +213,13 @@ def read(path: Path) -> Domain | None:
     return None if kept is None else _restored(kept)
 
 
-def _write_json(found: Domain, stream: BinaryIO) -> None:
+def _require_none(scales: Scales | None) -> None:
+    if scales is not None:
+        raise InputError("a domain has no units: save it without scales")
+
+
+def _write_json(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
+    _require_none(scales)
     whole = domain_object(found, found.most.size) | {"source": f"chuteflow {__version__}", "restore": _kept(found)}
     stream.write(contract.text(whole).encode() + b"\n")
 
@@ -231,8 +229,9 @@ def _kept_in_json(path: Path) -> Any:
     return kept if kept["kind"] == KIND else None
 
 
-def _write_csv(found: Domain, stream: BinaryIO) -> None:
+def _write_csv(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
     """One row for each cell, row by row from the lowest y, between comment lines."""
+    _require_none(scales)
     plane = found.plane
     table = dataset(found)
     y, x = np.meshgrid(found.y, found.x, indexing="ij")
@@ -273,8 +272,9 @@ def _kept_in_csv(path: Path) -> Any:
     return kept_in(lines, _RESTORE)
 
 
-def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
-    from chuteflow.io.netcdf_file import create, fixed_text, history
+def _write_netcdf(found: Domain, stream: BinaryIO, scales: Scales | None) -> None:
+    _require_none(scales)
+    from chuteflow.io.netcdf_file import fixed_text, history, write_groups
 
     map_ = dataset(found)
     kept = np.frombuffer(contract.text(_kept(found)).encode(), dtype="u1")
@@ -282,10 +282,13 @@ def _write_netcdf(found: Domain, stream: BinaryIO) -> None:
         "long_name": "columns, from which chuteflow restores the map to the last bit",
         "kind": fixed_text(KIND),
     }
-    with create(stream) as file:
-        Dataset(map_.variables, {**map_.attributes, "history": history()}).write(file)
-        outlines(found).write(file.create_group("boundaries"))
-        Dataset({"columns": Variable(("byte",), kept)}, about).write(file.create_group("restore"))
+    root = Dataset(map_.variables, {**map_.attributes, "history": history()})
+    restore = Dataset({"columns": Variable(("byte",), kept)}, about)
+    write_groups(stream, root, boundaries=outlines(found), restore=restore)
+
+
+#: What writes a map to a stream, by the ending of the file.
+WRITERS = {".nc": _write_netcdf, ".csv": _write_csv, ".json": _write_json}
 
 
 def _kept_in_netcdf(path: Path) -> Any:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from chuteflow.errors import InputError
 from chuteflow.fitting.calibration import Calibration
 from chuteflow.io import contract, records
+from chuteflow.io.dataset import Dataset, variable
 from chuteflow.io.reading import loading
 from chuteflow.io.records import FORMAT
-from chuteflow.io.writing import require_suffix, require_writable, write_whole
+from chuteflow.io.writing import require_suffix, write_file
+from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.free import free_parameter
-from chuteflow.steady.quantities import FIELDS, NUMBERS
+from chuteflow.steady.quantities import FIELDS, NUMBERS, SCALED, Scales
 
 if TYPE_CHECKING:
     from chuteflow.fitting.calibration import Fit, Fitted
@@ -81,21 +82,27 @@ def comparison_object(found: Sequence[Fit], reasons: Sequence[str]) -> dict[str,
     return {"fits": [fit_object(one) for one in found], "failed": list(reasons)}
 
 
-def prediction_object(found: Prediction) -> dict[str, Any]:
-    """What ``chuteflow predict --json`` prints: values with standard errors, null where one is infinite."""
+def prediction_object(found: Prediction, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow predict --json`` prints: values with standard errors, null where one is infinite; in SI units
+    where there are scales."""
+
+    def by(name: str) -> float:
+        return contract.factor(name, found.calibration.chute, scales)
+
     return {
+        **contract.units_object(scales, SCALED),
         "chute": contract.chute_object(found.calibration.chute),
         "parameters": list(found.calibration.keys),
         "confidence": found.confidence,
         "reason": found.flow_set.reason,
         "flows": [
             {
-                "flow": contract.flow_object(one.flow),
-                "errors": {NUMBERS[n].symbol: contract.finite(error) for n, (_, error) in one.numbers.items()},
+                "flow": contract.flow_object(one.flow, scales),
+                "errors": {NUMBERS[n].symbol: contract.finite(by(n) * error) for n, (_, error) in one.numbers.items()},
                 "profiles": {
-                    "z": one.height.tolist(),
+                    "z": (by("height") * one.height).tolist(),
                     **{
-                        name: {"value": _numbers(pair[0]), "error": _numbers(pair[1])}
+                        name: {"value": _numbers(by(name) * pair[0]), "error": _numbers(by(name) * pair[1])}
                         for name, pair in one.profiles.items()
                     },
                 },
@@ -104,29 +111,35 @@ def prediction_object(found: Prediction) -> dict[str, Any]:
         ],
         "curve": [
             {
-                "Q": np.exp(band.points[:, 0]).tolist(),
-                "h": np.exp(band.points[:, 1]).tolist(),
+                "Q": (by("mass_flux") * np.exp(band.points[:, 0])).tolist(),
+                "h": (by("centre_of_mass") * np.exp(band.points[:, 1])).tolist(),
                 "normal": band.normals.tolist(),
                 "error": _numbers(band.errors),
             }
             for band in found.bands
         ],
         "folds": [
-            {"kind": one.kind, "value": one.value, "relative_error": contract.finite(one.error)} for one in found.folds
+            {
+                "kind": one.kind,
+                "value": by(CONDITIONS[one.turns].quantity) * one.value,
+                "relative_error": contract.finite(one.error),
+            }
+            for one in found.folds
         ],
         "warnings": found.warnings,
     }
 
 
-def design_object(found: Design) -> dict[str, Any]:
-    """What ``chuteflow design --json`` prints."""
+def design_object(found: Design, scales: Scales | None = None) -> dict[str, Any]:
+    """What ``chuteflow design --json`` prints; flows in SI units where there are scales, what is wanted without."""
     return {
+        **contract.units_object(scales, NUMBERS),
         "wanted": dict(found.wanted),
         "solutions": [
             {
                 "values": dict(zip((p.key for p in found.unknown), one.values.tolist(), strict=True)),
                 "chute": contract.chute_object(one.flow.chute),
-                "flow": contract.flow_object(one.flow),
+                "flow": contract.flow_object(one.flow, scales),
             }
             for one in found.solutions
         ],
@@ -135,15 +148,26 @@ def design_object(found: Design) -> dict[str, Any]:
     }
 
 
-def prediction_rows(found: Prediction) -> Iterator[list[str]]:
-    """The profiles with their errors as rows of CSV."""
+def design_rows(found: Design, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The chutes and their flows as rows of a table."""
+    units = {name: "" if scales is None else f" [{one.unit}]" for name, one in NUMBERS.items()}
+    yield [*BY_KEY, *(f"{one.symbol}{units[name]}" for name, one in NUMBERS.items())]
+    for one in found.solutions:
+        chute = one.flow.chute
+        numbers = [getattr(one.flow, name) * contract.factor(name, chute, scales) for name in NUMBERS]
+        yield [*(getattr(chute, parameter.name) for parameter in BY_KEY.values()), *numbers]
+
+
+def prediction_rows(found: Prediction, scales: Scales | None = None) -> Iterator[list[Any]]:
+    """The profiles with their errors as rows of a table, in SI units where there are scales."""
     names = [name for name in FIELDS if name != "height"]
-    cells = [cell for name in names for cell in (FIELDS[name].symbol, f"{FIELDS[name].symbol}_error")]
-    yield ["flow", "z", *cells]
+    by = {name: contract.factor(name, found.calibration.chute, scales) for name in FIELDS}
+    units = {name: "" if scales is None else f" [{one.unit}]" for name, one in FIELDS.items()}
+    cells = [f"{FIELDS[name].symbol}{what}{units[name]}" for name in names for what in ("", "_error")]
+    yield ["flow", f"z{units['height']}", *cells]
     for i, one in enumerate(found.flows, 1):
-        columns = [values for name in names for values in one.profiles[name]]
-        for z, *row in zip(one.height, *columns, strict=True):
-            yield [str(i), repr(float(z)), *("" if not np.isfinite(v) else repr(float(v)) for v in row)]
+        columns = [by[name] * values for name in names for values in one.profiles[name]]
+        yield from ([i, *row] for row in np.column_stack([by["height"] * one.height, *columns]).tolist())
 
 
 def _numbers(values: Any) -> list[float | None]:
@@ -193,16 +217,20 @@ def save_fit(found: Fit, path: str | os.PathLike[str]) -> None:
     Raises:
         InputError: for another ending, or a file that cannot be written.
     """
-    kept: dict[str, Any] = {"format": FORMAT, "kind": KIND, "fit": fit_object(found)}
-    if require_writable(path, SAVED) == ".json":
-        write_whole(path, contract.text(kept) + "\n")
-        return
-    from chuteflow.io import netcdf_file
 
-    stream = BytesIO()
-    with netcdf_file.create(stream) as file:
-        _write(file, found, contract.text(kept).encode())
-    write_whole(path, stream.getvalue())
+    def write_json(stream: BinaryIO) -> None:
+        stream.write(_kept(found) + b"\n")
+
+    def write_netcdf(stream: BinaryIO) -> None:
+        from chuteflow.io.netcdf_file import write_groups
+
+        write_groups(stream, _dataset(found))
+
+    write_file(path, {".nc": write_netcdf, ".json": write_json})
+
+
+def _kept(found: Fit) -> bytes:
+    return contract.text({"format": FORMAT, "kind": KIND, "fit": fit_object(found)}).encode()
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -241,38 +269,36 @@ def _content(path: Path) -> bytes:
         return bytes(stored[...].tobytes())
 
 
-def _write(file: Any, found: Fit, content: bytes) -> None:
+def _dataset(found: Fit) -> Dataset:
+    """The estimates, the residuals and, as bytes, all that predictions are made from."""
     from chuteflow import __version__
 
-    k = len(found.free)
-    file.dimensions = {"parameter": k, "parameter_2": k, "end": 2, "byte": len(content)}
     names = " ".join(p.key for p in found.free)
-    file.attrs.update(
-        {
-            "Conventions": "CF-1.11",
-            "title": "Parameters of a chute from measurements",
-            "source": f"chuteflow {__version__}",
-            "parameters": names,
-            "chi2": found.chi2,
-            "values": found.count,
-            "unknowns": found.unknowns,
-            **found.chute.as_dict(),
-        }
-    )
-
-    def put(name: str, dimensions: tuple[str, ...], values: Any, said: str) -> None:
-        variable = file.create_variable(name, dimensions, values.dtype, data=values)
-        variable.attrs.update({"long_name": said, "units": "1"})
-
-    ends = np.array([[one.interval.low, one.interval.high] for one in found.estimates], dtype=float).reshape(k, 2)
-    put("estimate", ("parameter",), found.values.astype(float), f"estimates of {names}")
-    put("interval", ("parameter", "end"), ends, f"intervals of confidence {found.confidence:g}")
-    put("covariance", ("parameter", "parameter_2"), found.covariance, "covariance of the estimates")
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": "Parameters of a chute from measurements",
+        "source": f"chuteflow {__version__}",
+        "parameters": names,
+        "chi2": found.chi2,
+        "values": found.count,
+        "unknowns": found.unknowns,
+        **found.chute.as_dict(),
+    }
+    ends = np.array([[one.interval.low, one.interval.high] for one in found.estimates], dtype=float)
+    intervals = ends.reshape(len(found.free), 2)
+    variables = {
+        "estimate": variable(("parameter",), found.values.astype(float), f"estimates of {names}"),
+        "interval": variable(("parameter", "end"), intervals, f"intervals of confidence {found.confidence:g}"),
+        "covariance": variable(("parameter", "parameter_2"), found.covariance, "covariance of the estimates"),
+    }
     for i, one in enumerate(found.experiments, 1):
         for series, residual in one.profiles:
-            name = f"experiment_{i}_{series.symbol}"
-            file.dimensions[name] = len(residual)
-            put(f"{name}_height", (name,), series.height, f"heights of {series.symbol} in experiment {one.name}")
-            put(f"{name}_value", (name,), series.value, f"measured {series.symbol} in experiment {one.name}")
-            put(f"{name}_residual", (name,), residual, "computed minus measured, in standard errors")
-    put("fit", ("byte",), np.frombuffer(content, dtype="u1"), "everything, as a JSON text")
+            name, where = f"experiment_{i}_{series.symbol}", f"{series.symbol} in experiment {one.name}"
+            for part, values, said in (
+                ("height", series.height, f"heights of {where}"),
+                ("value", series.value, f"measured {where}"),
+                ("residual", residual, "computed minus measured, in standard errors"),
+            ):
+                variables[f"{name}_{part}"] = variable((name,), values, said)
+    content = np.frombuffer(_kept(found), dtype="u1")
+    return Dataset({**variables, "fit": variable(("byte",), content, "everything, as a JSON text")}, attributes)

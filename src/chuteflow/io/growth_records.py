@@ -1,14 +1,15 @@
-"""Growth rates and neutral curves as JSON objects and as rows of CSV."""
+"""Growth rates and neutral curves as JSON objects and as rows of tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chuteflow.io import contract
-from chuteflow.steady.quantities import NUMBERS, Scales
+from chuteflow.io.datasets import dataset
+from chuteflow.steady.quantities import NUMBERS, PLACE, Scales
 
 if TYPE_CHECKING:
     from chuteflow.stability.neutral import NeutralCurve
@@ -17,15 +18,12 @@ if TYPE_CHECKING:
 
 def wave_object(found: WaveMap, scales: Scales | None = None) -> dict[str, Any]:
     """What ``chuteflow growth --json`` prints; in SI units where ``scales`` are given."""
-    chute = found.flow.chute
+    chute, table = found.flow.chute, dataset(found, scales)
     wave, rate = (contract.factor(name, chute, scales) for name in ("wavenumber", "growth"))
     return {
         "chute": contract.chute_object(chute),
         "flow": contract.flow_object(found.flow, scales),
-        "kx": (wave * found.kx).tolist(),
-        "ky": (wave * found.ky).tolist(),
-        "growth": _finite(rate * found.growth),
-        "frequency": _finite(rate * found.frequency),
+        **{name: table.lists(name) for name in ("kx", "ky", "growth", "frequency")},
         "threshold": rate * found.smallest_rate,
         "growing": int(found.grows.sum()),
         "unresolved": [
@@ -46,14 +44,13 @@ def wave_object(found: WaveMap, scales: Scales | None = None) -> dict[str, Any]:
 
 def family_object(found: FamilyMap, scales: Scales | None = None) -> dict[str, Any]:
     """What ``chuteflow neutral --json`` prints; in SI units where ``scales`` are given."""
-    rate = contract.factor("growth", found.flows[0].chute, scales)
+    rate, table = contract.factor("growth", found.flows[0].chute, scales), dataset(found, scales)
     return {
         "chute": contract.chute_object(found.flows[0].chute),
         "angle": found.angle,
         "kh": found.depth_wavenumber.tolist(),
         "flows": contract.places_object(found.flows, scales),
-        "growth": _finite(rate * found.growth),
-        "frequency": _finite(rate * found.frequency),
+        **{name: table.lists(name) for name in ("growth", "frequency")},
         "threshold": (rate * found.smallest_rate).tolist(),
         "growing": int(found.grows.sum()),
         "unresolved": [
@@ -68,29 +65,20 @@ def family_object(found: FamilyMap, scales: Scales | None = None) -> dict[str, A
             }
             for curve, flows in zip(found.neutral, found.neutral_flows, strict=True)
         ],
-        **contract.units_object(scales, (*contract.PLACE, "growth")),
+        **contract.units_object(scales, (*PLACE, "growth")),
     }
 
 
-def wave_rows(found: WaveMap, scales: Scales | None = None) -> Iterator[list[str]]:
-    """The map as rows of CSV; an empty cell where growth is not known."""
-    wave, rate = (contract.factor(name, found.flow.chute, scales) for name in ("wavenumber", "growth"))
-    yield ["kx", "ky", "growth", "frequency"]
-    for i, along in enumerate((wave * found.kx).tolist()):
-        for j, across in enumerate((wave * found.ky).tolist()):
-            cells = (along, across, rate * float(found.growth[i, j]), rate * float(found.frequency[i, j]))
-            yield ["" if np.isnan(cell) else repr(cell) for cell in cells]
+def wave_rows(found: WaveMap, scales: Scales | None = None) -> Iterator[Sequence[Any]]:
+    """The map as rows of a table."""
+    return dataset(found, scales).rows({name: name for name in ("kx", "ky", "growth", "frequency")})
 
 
-def family_rows(found: FamilyMap, scales: Scales | None = None) -> Iterator[list[str]]:
-    """The map as rows of CSV; an empty cell where growth is not known."""
-    rate = contract.factor("growth", found.flows[0].chute, scales)
-    yield ["kh", *(NUMBERS[name].symbol for name in contract.PLACE), "growth", "frequency"]
-    for j, flow in enumerate(found.flows):
-        of_flow = [*contract.place_object(flow, scales).values()]
-        for i, kh in enumerate(found.depth_wavenumber.tolist()):
-            cells = (kh, *of_flow, rate * float(found.growth[i, j]), rate * float(found.frequency[i, j]))
-            yield ["" if np.isnan(cell) else repr(cell) for cell in cells]
+def family_rows(found: FamilyMap, scales: Scales | None = None) -> Iterator[Sequence[Any]]:
+    """The map as rows of a table, flow after flow."""
+    names = {NUMBERS[name].symbol: name for name in PLACE}
+    headings = {"kh": "depth_wavenumber", **names, "growth": "growth", "frequency": "frequency"}
+    return dataset(found, scales).rows(headings, order=("flow", "depth_wavenumber"))
 
 
 def _of_curve(curve: NeutralCurve, rate: float, error: float) -> dict[str, Any]:
@@ -100,7 +88,3 @@ def _of_curve(curve: NeutralCurve, rate: float, error: float) -> dict[str, Any]:
         "error": (error * curve.error).tolist(),
         "ends": list(curve.ends),
     }
-
-
-def _finite(values: Any) -> list[list[float | None]]:
-    return [[contract.finite(value) for value in row] for row in values]

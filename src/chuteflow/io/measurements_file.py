@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from chuteflow.amounts import read_si
 from chuteflow.checks import number, shown
 from chuteflow.errors import InputError
 from chuteflow.fitting.measurements import (
@@ -26,7 +27,7 @@ from chuteflow.fitting.measurements import (
     assembled,
     together,
 )
-from chuteflow.io.units import read_si
+from chuteflow.io.units import WITHOUT_GRAINS
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.quantities import QUANTITIES, Scales
 
@@ -218,7 +219,10 @@ def _cell(name: str, column: _MeasuredColumn, text: str) -> float:
 def _single(name: str, key: str, values: Sequence[float]) -> float:
     found = {value for value in values if not math.isnan(value)}
     if len(found) != 1:
-        raise InputError(f"experiment {name}: {key} has several values: it is one number for the whole flow")
+        raise InputError(
+            f"experiment {name}: {key} has several values: it is one number for the whole flow; "
+            "where rows are several flows, name them in a column experiment"
+        )
     return found.pop()
 
 
@@ -236,7 +240,7 @@ def _factor(column: _MeasuredColumn, slope: float | None, scales: Scales | None)
         raise InputError(f"column {column.title!r}: it has no unit; relative errors are in [%]")
     in_si = read_si(f"column {column.title!r}", f"1 {column.unit}", unit)
     if scales is None:
-        raise InputError(f"column {column.title!r}: a unit needs the grains, give their diameter and density too")
+        raise InputError(f"column {column.title!r}: {WITHOUT_GRAINS}")
     if slope is None:
         raise InputError(f"column {column.title!r}: a unit needs the slope of the chute")
     return in_si / scales.factor(name[column.key], slope)

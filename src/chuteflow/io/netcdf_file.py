@@ -39,9 +39,15 @@ _PER_FLOW = ("degree", "stretch", "error")
 
 def write(result: Result, stream: BinaryIO, scales: Scales | None) -> None:
     """Write ``result`` to ``stream``, in memory: HDF5 may end the process where a disk is full."""
+    write_groups(stream, flow_dataset(result, scales, history()), restore=_unknowns(result))
+
+
+def write_groups(stream: BinaryIO, root: Dataset, **groups: Dataset) -> None:
+    """Write ``root``, and ``groups`` into groups of these names, which inherit its dimensions."""
     with create(stream) as file:
-        flow_dataset(result, scales, history()).write(file)
-        _unknowns(result).write(file.create_group("restore"), inherited=("flow",))
+        root.write(file)
+        for name, group in groups.items():
+            group.write(file.create_group(name), inherited=[one for one in group.sizes if one in root.sizes])
 
 
 def history() -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from chuteflow.io import contract
 from chuteflow.steady.quantities import NUMBERS
 
@@ -46,12 +44,11 @@ def sensitivity_object(found: Sensitivity, heights: Array | None = None) -> dict
     return answer
 
 
-def sensitivity_rows(found: Sensitivity) -> Iterator[list[str]]:
-    """The derivatives of every number as rows of CSV; an empty cell where one is not finite."""
+def sensitivity_rows(found: Sensitivity) -> Iterator[list[Any]]:
+    """The derivatives of every number as rows of a table."""
     yield ["quantity", "value", *(f"d/d{key}" for key in found.keys)]
     for name, values in found.numbers.items():
-        cells = (getattr(found.flow, name), *values.tolist())
-        yield [NUMBERS[name].symbol, *("" if not np.isfinite(cell) else repr(float(cell)) for cell in cells)]
+        yield [NUMBERS[name].symbol, float(getattr(found.flow, name)), *values.tolist()]
 
 
 def _by_key(found: Sensitivity, values: Array) -> dict[str, float | None]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from chuteflow.branches.results import FlowSet
-from chuteflow.io.contract import chute_object, factor, finite, flow_object, searched_object, units_object
+from chuteflow.io.contract import chute_object, factor, finite, flow_object, place_object, searched_object, units_object
 from chuteflow.stability.answers import StabilityAnswer
 from chuteflow.stability.budget import ModeBudget
 from chuteflow.stability.modes import Mode
@@ -80,19 +80,16 @@ def budget_object(budget: ModeBudget, rate: float = 1.0) -> dict[str, Any]:
     }
 
 
-def csv_rows(answers: Sequence[StabilityAnswer], scales: Scales | None = None) -> list[list[str]]:
-    """A head and one row for each mode, or one for a flow without; empty where there is no number."""
-    rows: list[list[str]] = [list(COLUMNS)]
+def csv_rows(answers: Sequence[StabilityAnswer], scales: Scales | None = None) -> Iterator[list[Any]]:
+    """A head and one row for each mode, or one for a flow without."""
+    yield list(COLUMNS)
     for answer in answers:
-        flow = flow_object(answer.flow, scales)
-        start = [repr(flow[name]) for name in ("Q", "h", "M", "T_surface")]
+        start = place_object(answer.flow, scales).values()
         known = None if answer.found is None else answer.found.stable
         stable = "" if known is None else str(known).lower()
         for mode in answer.modes or (None,):
             numbers = {} if mode is None else mode_object(mode, chute=answer.flow.chute, scales=scales)
-            cells = [numbers.get(name) for name in COLUMNS[5:]]
-            rows.append([*start, stable, *("" if cell is None else str(cell) for cell in cells)])
-    return rows
+            yield [*start, stable, *(numbers.get(name) for name in COLUMNS[5:])]
 
 
 def _answer(answer: StabilityAnswer, fields: bool, scales: Scales | None) -> dict[str, Any]:

@@ -11,10 +11,17 @@ from chuteflow.steady.flow import Flow
 from chuteflow.steady.quantities import NUMBERS, Scales
 
 
-def heading(names: Sequence[str], scales: Scales | None) -> list[list[str]]:
-    """Symbols of numbers of the registry as a row of cells, and with scales their units as a second."""
-    symbols = [NUMBERS[name].symbol for name in names]
-    return [symbols] if scales is None else [symbols, [f"[{NUMBERS[name].unit}]" for name in names]]
+def heading(
+    names: Sequence[str],
+    scales: Scales | None,
+    before: Sequence[tuple[str, str]] = (),
+    after: Sequence[tuple[str, str]] = (),
+) -> list[list[str]]:
+    """Symbols of numbers of the registry as a row of cells, and with scales their units as a second; with other cells
+    ``before`` and ``after`` them, each with its unit or an empty text."""
+    cells = [*before, *((NUMBERS[name].symbol, NUMBERS[name].unit) for name in names), *after]
+    symbols = [symbol for symbol, _ in cells]
+    return [symbols] if scales is None else [symbols, [f"[{unit}]" if unit else "" for _, unit in cells]]
 
 
 def numbers(flow: Flow, names: Sequence[str], chute: Chute, scales: Scales | None) -> list[str]:

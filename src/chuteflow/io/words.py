@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from chuteflow.branches.counting import FlowCount, flux_counts
 from chuteflow.branches.nearest import Nearest
-from chuteflow.branches.results import Curve, Searched
+from chuteflow.branches.results import Curve, FlowSet, Searched
 from chuteflow.io.contract import factor
 from chuteflow.io.tables import number
 from chuteflow.parameters import CONDITIONS, PARAMETERS
@@ -26,7 +27,23 @@ _INTERIORS = {
     "productive": "interior productive throughout",
     "mixed": "interior productive in some places and dissipative in others (mixed)",
 }
-_SURFACES = {"free": "free surface", "interface": "interface with free grains above"}
+
+
+def introduction(chute_: Chute, scales_: Scales | None) -> Iterator[str]:
+    """The chute of a report, and with scales its grains."""
+    yield chute(chute_)
+    if scales_ is not None:
+        yield scales(scales_)
+
+
+def search_outcome(found: FlowSet | Curve, scales: Scales | None, near: Sequence[str] = ()) -> Iterator[str]:
+    """Why there is no flow, followed by the lines ``near``; whether there may be more; and the range searched."""
+    if found.reason:
+        yield in_own_units(f"no flow: {found.reason}", scales)
+        yield from near
+    if found.incomplete:
+        yield in_own_units(f"there may be more: {found.incomplete}", scales)
+    yield searched(found.searched, found.chute, scales)
 
 
 def among(flow: Flow, flows: Sequence[Flow]) -> str:
@@ -61,9 +78,7 @@ def kinds(flow: Flow) -> str:
 
 def chute(chute: Chute) -> str:
     """All parameters of ``chute``."""
-    slope, *others = (f"{one.symbol} = {getattr(chute, name):g}" for name, one in PARAMETERS.items())
-    numbers = ", ".join([f"{slope} ({chute.angle:.4g} degrees)", *others])
-    return f"chute: {numbers}, {_SURFACES[chute.surface]}, {chute.laws}"
+    return f"chute: {chute.summary}"
 
 
 def scales(scales: Scales) -> str:
@@ -74,7 +89,11 @@ def scales(scales: Scales) -> str:
 
 def in_own_units(sentence: str, scales: Scales | None) -> str:
     """A sentence of the analyses, whose numbers stay dimensionless beside results in SI units."""
-    return sentence if scales is None else f"{sentence} (dimensionless)"
+    if scales is None:
+        return sentence
+    # What was searched is said in SI units on a line of its own.
+    sentence = re.sub(r" \(searched: [^)]*\)$", "", sentence)
+    return f"{sentence} (dimensionless)" if re.search(r"\d", sentence) else sentence
 
 
 def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
@@ -82,8 +101,8 @@ def searched(range_: Searched, chute: Chute, scales: Scales | None) -> str:
     temperature, mass = factor("surface_temperature", chute, scales), factor("mass_holdup", chute, scales)
     low, high = (value * temperature for value in range_.surface_temperature)
     return (
-        f"searched: T_surface from {low:.4g} to {high:.4g}{_unit('surface_temperature', scales)}, "
-        f"M up to {range_.largest_holdup * mass:.4g}{_unit('mass_holdup', scales)}"
+        f"searched: T_surface from {low:.4g} to {high:.4g}{unit_after('surface_temperature', scales)}, "
+        f"M up to {range_.largest_holdup * mass:.4g}{unit_after('mass_holdup', scales)}"
     )
 
 
@@ -111,7 +130,7 @@ def nearest(found: Nearest, scales: Scales | None) -> Iterator[str]:
 
 def multiplicity(curve: Curve, scales: Scales | None) -> str:
     """How many flows share one mass flux, from folds and ends of the branches."""
-    flux, unit = factor("mass_flux", curve.chute, scales), _unit("mass_flux", scales)
+    flux, unit = factor("mass_flux", curve.chute, scales), unit_after("mass_flux", scales)
     counts = flux_counts(curve)
     known = [f"{'at least ' if c.at_least else ''}{c.flows} for {_fluxes(c, flux)}" for c in counts if c.flows]
     unknown = [_fluxes(c, flux) for c in counts if c.at_least and not c.flows]
@@ -133,8 +152,9 @@ def _fluxes(count: FlowCount, factor: float) -> str:
 
 def amount(name: str, value: float, chute: Chute, scales: Scales | None) -> str:
     """A dimensionless value of the quantity ``name``, with its unit where there are ``scales``."""
-    return f"{number(value * factor(name, chute, scales))}{_unit(name, scales)}"
+    return f"{number(value * factor(name, chute, scales))}{unit_after(name, scales)}"
 
 
-def _unit(name: str, scales: Scales | None) -> str:
+def unit_after(name: str, scales: Scales | None) -> str:
+    """The unit of a quantity after a space; nothing without scales or unit."""
     return "" if scales is None or SCALED[name].unit == "1" else f" {SCALED[name].unit}"

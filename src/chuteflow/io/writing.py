@@ -9,9 +9,9 @@ import platform
 import re
 import secrets
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from io import TextIOWrapper
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
@@ -44,6 +44,18 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     finally:
         with suppress(OSError):
             partial.unlink()
+
+
+def write_file(path: str | os.PathLike[str], writers: Mapping[str, Callable[[BinaryIO], None]]) -> None:
+    """Write a file in the format of its ending, by the one of ``writers`` that is for it, whole or not at all.
+
+    Raises:
+        InputError: for another ending, or a file that cannot be written.
+    """
+    write = writers[require_writable(path, tuple(writers))]
+    stream = BytesIO()
+    write(stream)
+    write_whole(path, stream.getvalue())
 
 
 @contextmanager

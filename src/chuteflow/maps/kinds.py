@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.branches.counting import most_at_once
+from chuteflow.branches.counting import most_at_once, solve_turns
+from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.rough_turns import find_extrema
+from chuteflow.branches.solution_branches import SolutionBranch
 from chuteflow.maps.zeros import Index, Zeros, evaluate_zeros
 from chuteflow.numerics.chebyshev import Array
-from chuteflow.numerics.interpolation import lagrange
+from chuteflow.numerics.compiled import compiled
 from chuteflow.steady import kinds as flow_kinds
-from chuteflow.trajectories.refining import TrajectoryGrid
+from chuteflow.trajectories.refining import RoughBranch, TrajectoryGrid
 
 #: Bits of the kinds that are present among the flows of a chute.
 INTERIORS = {name: 1 << i for i, name in enumerate(flow_kinds.INTERIORS)}
 DENSITIES = {name: 1 << i for i, name in enumerate(flow_kinds.DENSITIES)}
 #: Turns of ln Q along a branch are distinguished if they differ by more.
 _TURN = 1e-6
+#: To which branches are solved where the grid leaves the number of flows in doubt.
+_TOLERANCE = 1e-8
 #: A net loss below this fraction of the largest is none, and more of it for hold-ups that are not small against the
 #: second number: deep grains, in balance, come near to it. A rise of the density below the third, for each unit of
 #: hold-up, is none either.
@@ -32,9 +37,9 @@ class FlowClasses:
     """The flows of one chute in the range searched.
 
     ``at`` is whether there is one at each requested temperature; ``most`` is the largest number at one flux, and
-    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty;
-    ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have the bits of
-    INTERIORS and DENSITIES that are present.
+    ``doubtful`` is whether it would be larger with turns of the flux that are smaller than its uncertainty, and could
+    not be solved; ``families`` is the number of branches (connected sets of flows); ``interior`` and ``density`` have
+    the bits of INTERIORS and DENSITIES that are present.
     """
 
     at: tuple[bool, ...]
@@ -45,26 +50,61 @@ class FlowClasses:
     doubtful: bool
 
 
-def classify_flows(grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float]) -> FlowClasses:
+def classify_flows(
+    grid: TrajectoryGrid, extremes: Array, temperatures: Sequence[float], within: SearchRange
+) -> FlowClasses:
     """The kinds of the flows on ``grid``, and whether there are any at ``temperatures``; ``extremes`` (N, 6) are those
-    of :func:`chuteflow.maps.zeros.bound_extremes`."""
-    lines = [line for line, _ in grid.lines if len(line) > 1]
+    of :func:`chuteflow.maps.zeros.bound_extremes`. Where the largest number of flows of one flux depends on turns of
+    the flux that are smaller than its uncertainty, the branches are solved there."""
+    lines = [line for line in grid.lines if len(line[0]) > 1]
     if not lines:
         return FlowClasses((False,) * len(temperatures), 0, 0, 0, 0, doubtful=False)
     zeros = evaluate_zeros(grid, extremes)
     at = np.zeros(len(temperatures), dtype=bool)
-    pieces, interior, density = [], 0, 0
-    for line in lines:
-        hotter = zeros.log_t[line, None] >= np.log(temperatures)
-        at |= hotter.any(axis=0) & ~hotter.all(axis=0)
+    every, sure, interior, density = [], [], 0, 0
+    for line, _ in lines:
+        if len(temperatures):
+            hotter = zeros.log_t[line, None] >= np.log(temperatures)
+            at |= hotter.any(axis=0) & ~hotter.all(axis=0)
         kept = zeros.along(line)
-        pieces.append(_monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept]))
+        pieces = _monotonic_pieces(zeros.log_t[kept], zeros.log_m[kept], zeros.log_q[kept], zeros.rise[kept])
+        every.append(pieces[0])
+        sure.append(pieces[1])
         found = _present(zeros, kept)
         interior |= sum(bit for bit, there in zip(INTERIORS.values(), found[:3], strict=True) if there)
         density |= sum(bit for bit, there in zip(DENSITIES.values(), found[3:], strict=True) if there)
-    most, least = (most_at_once(np.concatenate(stretches), _TURN) for stretches in zip(*pieces, strict=True))
+    doubtful = _most(every) != _most(sure)
+    if doubtful:
+        solved = [
+            one if len(one) == len(other) else _solve_pieces(zeros, line, closed, within)
+            for (line, closed), one, other in zip(lines, sure, every, strict=True)
+        ]
+        known = [one for one in solved if one is not None]
+        if len(known) == len(lines):
+            sure, doubtful = known, False
     there = tuple(map(bool, at.tolist()))
-    return FlowClasses(there, least, len(lines), interior, density, doubtful=most != least)
+    return FlowClasses(there, _most(sure), len(lines), interior, density, doubtful)
+
+
+def _most(pieces: Sequence[Array]) -> int:
+    """The largest number of pieces that share a flux, given those of each branch."""
+    return most_at_once(np.concatenate(pieces), _TURN)
+
+
+def _solve_pieces(zeros: Zeros, line: Index, closed: bool, within: SearchRange) -> Array | None:
+    """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, which are solved; None where
+    it could not be followed."""
+    grid = zeros.grid
+    kept = zeros.along(line)
+    apart, at = _places(zeros.log_t[kept], zeros.log_m[kept])
+    kept = kept[apart]
+    before, _ = _changes(zeros.rise[kept], at)
+    first, last = (int(np.flatnonzero(line == kept[i])[0]) for i in (before[0], before[-1] + 1))
+    branch = SolutionBranch(RoughBranch(grid, line, grid.macroscopic[line], closed), within)
+    turns = solve_turns(branch, first, last, _TOLERANCE)
+    if turns is None:
+        return None
+    return _stretches([float(zeros.log_q[kept[0]]), *turns.tolist(), float(zeros.log_q[kept[-1]])])
 
 
 def _present(zeros: Zeros, line: Index) -> list[bool]:
@@ -105,42 +145,68 @@ def _margins(lower: Array, upper: Array, doubt: Array) -> list[Array]:
 def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> tuple[Array, Array]:
     """Lowest and highest ln Q (pieces, 2) of the stretches of a branch between turns of Q, where ``rise`` changes
     sign: of all turns, and of those alone that are larger than ln Q is uncertain."""
-    length = np.hypot(np.diff(log_t), np.diff(log_m))
-    keep = np.append(True, length > 1e-9)
-    log_q, rise, at = log_q[keep], rise[keep], np.cumsum(np.append(0.0, length))[keep]
+    apart, at = _places(log_t, log_m)
+    log_q, rise = log_q[apart], rise[apart]
     before, share = _changes(rise, at)
     if not before.size:
         whole = np.sort(log_q[[0, -1]])[None]
         return whole, whole
-    turns = at[before] + (at[before + 1] - at[before]) * share
-    turned = np.interp(turns, at, log_q)
-    if len(at) > 3:
-        around = np.clip(before - 1, 0, len(at) - 4) + np.arange(4)[:, None]
-        cubic = (lagrange(at[around], turns) * log_q[around]).sum(axis=0)
-        # Through uneven places a cubic may overshoot: beyond the step by no more than the steps around.
-        reach = np.abs(np.diff(log_q[around], axis=0)).max(axis=0)
-        turned = np.clip(cubic, turned - reach, turned + reach)
+    turned, noise = _turned(log_q, at, before, share)
     along = np.sign(float(((rise[1:] + rise[:-1]) * np.diff(log_q)).sum()))
     first = along if rise[0] > 0.0 else -along
-    stops = [log_q[0], *turned, log_q[-1]]
-    scatter = _scatter(log_q, at)
-    noise = [0.0, *np.maximum(scatter[before], scatter[before + 1]), 0.0]
-    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, noise))
+    stops = [float(log_q[0]), *turned.tolist(), float(log_q[-1])]
+    scatter = [0.0, *noise.tolist(), 0.0]
+    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, scatter))
+
+
+def _places(log_t: Array, log_m: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which flows of a branch are apart from the one before, and the places of these along it."""
+    length = np.hypot(np.diff(log_t), np.diff(log_m))
+    apart = np.append(True, length > 1e-9)
+    return apart, np.cumsum(np.append(0.0, length))[apart]
 
 
 def _stretches(stops: list[float]) -> Array:
     return np.sort(np.stack([stops[:-1], stops[1:]], axis=1), axis=1)
 
 
-def _scatter(log_q: Array, at: Array) -> Array:
-    """How far values (k,) lie beside the cubics through the two before and the two after, (k,); at the two places next
-    to each end as at the nearest other."""
-    if len(at) < 5:
-        return np.zeros(len(at))
-    middle = np.arange(2, len(at) - 2)
-    around = middle + np.array([-2, -1, 1, 2])[:, None]
-    beside = np.abs((lagrange(at[around], at[middle]) * log_q[around]).sum(axis=0) - log_q[middle])
-    return np.pad(beside, 2, mode="edge")
+@compiled
+def _turned(log_q: Any, at: Any, before: Any, share: Any) -> tuple[Any, Any]:
+    """ln Q where it turns in the steps ``before`` (k,) of the places ``at``, at the ``share`` of each; and how far its
+    values beside these lie beside the cubics through the two before and the two after (k,)."""
+    turned, noise = np.empty(len(before)), np.zeros(len(before))
+    count = len(at)
+    for k in range(len(before)):
+        i = before[k]
+        here = at[i] + (at[i + 1] - at[i]) * share[k]
+        turned[k] = log_q[i] + share[k] * (log_q[i + 1] - log_q[i])
+        if count > 3:
+            first = min(max(i - 1, 0), count - 4)
+            around = np.arange(first, first + 4)
+            # Through uneven places a cubic may overshoot: beyond the step by no more than the steps around.
+            reach = np.abs(np.diff(log_q[first : first + 4])).max()
+            cubic = _through(at, log_q, around, here)
+            turned[k] = min(max(cubic, turned[k] - reach), turned[k] + reach)
+        for side in (i, i + 1):
+            if count > 4:
+                # At the two places next to each end as at the nearest other.
+                middle = min(max(side, 2), count - 3)
+                around = middle + np.array([-2, -1, 1, 2])
+                noise[k] = max(noise[k], abs(_through(at, log_q, around, at[middle]) - log_q[middle]))
+    return turned, noise
+
+
+@compiled
+def _through(at: Any, values: Any, around: Any, x: float) -> float:
+    """At ``x`` the cubic through the values at four places."""
+    total = 0.0
+    for i in around:
+        weight = 1.0
+        for j in around:
+            if j != i:
+                weight *= (x - at[j]) / (at[i] - at[j])
+        total += weight * values[i]
+    return total
 
 
 def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
@@ -150,6 +216,8 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     pairs = [
         (dip.step, zero) for dip in find_extrema(rise, at, passing=True) if len(dip.zeros) == 2 for zero in dip.zeros
     ]
+    if not pairs:
+        return changes, rise[changes] / (rise[changes] - rise[changes + 1])
     steps = np.concatenate([changes, np.array([step for step, _ in pairs], dtype=np.intp)])
     fractions = np.concatenate(
         [rise[changes] / (rise[changes] - rise[changes + 1]), np.array([share for _, share in pairs], dtype=float)]

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.branches.counting import most_solved
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.checks import number
 from chuteflow.errors import InputError
@@ -39,8 +38,6 @@ SUMMARY = ("hot", "most", "families", "interior", "density")
 HOT_CODES = ("hot", "base", "inside", "steep", "inversion")
 #: Bases along an axis, which bound those that a grid has to serve.
 _BETWEEN = 9
-#: To which branches are solved where a grid leaves the number of flows in doubt.
-_TOLERANCE = 1e-8
 #: Surface temperatures whose logarithms are nearer are one.
 _SAME = 1e-6
 
@@ -153,13 +150,8 @@ def summarise(plane: ParameterPlane, outer: float, inner: float) -> Code:
 
 
 def _kinds(plane: ParameterPlane, chute: Chute) -> FlowClasses:
-    grid, extremes = _grid(plane, replace(chute, **_neutral(plane)), chute.law)
-    problem = model(chute)
-    found = classify_flows(grid.of_base(problem), extremes, plane.temperatures)
-    if not found.doubtful:
-        return found
-    most = most_solved(problem, plane.within, _TOLERANCE)
-    return found if most is None else replace(found, most=most, doubtful=False)
+    grid, extremes = _grid(plane, chute.slope, chute.restitution, chute.law)
+    return classify_flows(grid.of_base(model(chute)), extremes, plane.temperatures, plane.within)
 
 
 def classify_hot(plane: ParameterPlane, outer: float, inner: float) -> Code:
@@ -189,10 +181,10 @@ def _neutral(plane: ParameterPlane) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def _grid(plane: ParameterPlane, chute: Chute, registered: Law) -> tuple[TrajectoryGrid, Array]:
-    """The grid of trajectories of all points of ``plane`` whose grains, with their law, and slope are those of
-    ``chute``, and its extremes."""
+def _grid(plane: ParameterPlane, slope: float, restitution: float, registered: Law) -> tuple[TrajectoryGrid, Array]:
+    """The grid of trajectories of all points of ``plane`` with one slope and restitution, and its extremes."""
     del registered  # known here to tell what is remembered of one law from that of another
+    chute = replace(plane.chute, slope=slope, restitution=restitution, **_neutral(plane))
     served = [chute]
     for axis in (plane.x, plane.y):
         if PARAMETERS[axis.name].of_base:

@@ -67,22 +67,6 @@ def itp_trial(bracket: tuple[float, float], values: tuple[float, float], push: f
     return middle - inward * min(distance, max(radius, 0.0))
 
 
-def false_position(function: Callable[[Array], Array], start: Array, steps: int = 3) -> Array:
-    """The zeros of functions between 0 and 1, (n,), after a few ``steps`` of false position from ``start``; at an end
-    where a function has one sign in between."""
-    low, high = np.zeros_like(start), np.ones_like(start)
-    f_low, f_high = function(low), function(high)
-    x = start
-    for _ in range(steps):
-        f = function(x)
-        left = (f > 0.0) == (f_low > 0.0)
-        low, f_low = np.where(left, x, low), np.where(left, f, f_low)
-        high, f_high = np.where(left, high, x), np.where(left, f_high, f)
-        span = f_high - f_low
-        x = np.clip(low - f_low * (high - low) / np.where(span != 0.0, span, 1.0), 0.0, 1.0)
-    return x
-
-
 def find_zeros(
     function: Callable[[NDArray[np.intp], Array], Array],
     low: Array,

@@ -54,7 +54,8 @@ def plot(result: Any, *, scales: Scales | None = None, theme: str = "print", **o
         ) from None
     _show(figure)
     axes = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
-    return axes[0] if len(axes) == 1 else np.array(axes)
+    # Where there is no flow there is one panel, and callers count on an array all the same.
+    return axes[0] if len(axes) == 1 and not isinstance(result, (FlowSet, Curve)) else np.array(axes)
 
 
 @singledispatch

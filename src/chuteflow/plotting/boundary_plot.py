@@ -57,7 +57,7 @@ def plot_boundaries(shown: Diagram, *, scales: Scales | None = None) -> Figure:
     second = PARAMETERS[found.second]
     style.name_axes(ax, f"{second.noun}, ${second.latex}$", style.label(quantity, scales))
     style.caption(figure, f"{KINDS[found.kind]}\n{parameters(found.chute, found.second)}")
-    key = list(_key(shown))
+    key = list(_key(shown, scales))
     beside = all(len(entry.get_label()) < _LONG for entry in key)
     style.legend(figure, handles=key, loc="outside lower center", ncols=2 if beside else 1)
     figure.draw_without_rendering()  # which settles where points are
@@ -142,15 +142,17 @@ def _marker(kind: str, colour: str) -> dict[str, Any]:
     }
 
 
-def _key(shown: Diagram) -> Iterator[Any]:
+def _key(shown: Diagram, scales: Scales | None) -> Iterator[Any]:
     """Entries of the legend: the boundaries, the kinds of turning points, and what numbers count."""
     from matplotlib.lines import Line2D
 
     found = shown.found
     symbol = NUMBERS["surface_temperature"].latex
     for i, boundary in enumerate(found):
-        low, high = boundary.surface_temperature.min(), boundary.surface_temperature.max()
-        yield Line2D([], [], label=rf"${symbol}$ from {low:.3g} to {high:.3g}", **style.stroke(i).line())
+        temperature = _along(boundary, "surface_temperature", scales)
+        low, high = (f"${style.in_formula(f'{end:.3g}')}$" for end in (temperature.min(), temperature.max()))
+        unit = style.unit("surface_temperature", scales)
+        yield Line2D([], [], label=rf"${symbol}$ from {low} to {high}{unit}", **style.stroke(i).line())
     kinds = {turn.kind for boundary in found for turn in boundary.special}
     for kind in TURNS:
         if kind in kinds:

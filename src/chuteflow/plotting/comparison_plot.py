@@ -35,20 +35,25 @@ def plot_comparison(found: Comparison) -> Figure:
     """Above, nu, T and u over p/M, measured with bands of two standard errors and of the flows at the same hold-up;
     below, the measured functions over those of each law."""
     figure, axes = style.panels(3, 2, height=5.6)
-    measured, share = found.measured, found.measured.share
+    measured, fraction = found.measured, found.measured.fraction_above
     nu = measured.fields["volume_fraction"]
-    good = np.isfinite(measured.fields["granular_temperature"]) & (share >= _HIGHEST)
+    good = np.isfinite(measured.fields["granular_temperature"]) & (fraction >= _HIGHEST)
     # Layers below the lowest grains.
-    good &= (share < 0.5) | (nu > _EMPTY * np.nanmax(nu))
+    good &= (fraction < 0.5) | (nu > _EMPTY * np.nanmax(nu))
     for ax, (name, text) in zip(axes[:3], _FIELDS.items(), strict=True):
         values = measured.fields[name]
         if name in measured.errors:
             wide = _BAND * measured.errors[name]
             ax.fill_betweenx(
-                share[good], (values - wide)[good], (values + wide)[good], color=style.GREY, alpha=0.35, linewidth=0.0
+                fraction[good],
+                (values - wide)[good],
+                (values + wide)[good],
+                color=style.GREY,
+                alpha=0.35,
+                linewidth=0.0,
             )
-        ax.plot(values[good], share[good], color=style.BLACK, linewidth=0.0, marker=".", markersize=3.0)
-        style.name_axes(ax, text, "share above, $p/M$" if ax is axes[0] else None)
+        ax.plot(values[good], fraction[good], color=style.BLACK, linewidth=0.0, marker=".", markersize=3.0)
+        style.name_axes(ax, text, "fraction above, $p/M$" if ax is axes[0] else None)
     closures = [one.closure for one in found.functions]
     at = np.linspace(_HIGHEST, 1.0, _POINTS)
     handles = {}
@@ -73,7 +78,7 @@ def plot_comparison(found: Comparison) -> Figure:
                     middle, one.ratios[name], yerr=bars, color=colour, marker="o", markersize=2.5, linewidth=0.8
                 )
                 handles.setdefault(one.closure, drawn)
-        style.name_axes(ax, "share above, $p/M$", _RATIOS[name])
+        style.name_axes(ax, "fraction above, $p/M$", _RATIOS[name])
     style.caption(
         figure,
         rf"$\tan\theta = {measured.slope:g}$, $e = {measured.restitution:g}$, $e_w = {measured.wall_restitution:g}$, "

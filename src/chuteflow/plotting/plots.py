@@ -151,8 +151,9 @@ def parameters(chute: Chute, *left_out: str) -> str:
 def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:
     units = {name: "" if scales is None else f" {style.printed(NUMBERS[name].unit)}" for name in PLACE}
     return ", ".join(
-        f"${NUMBERS[name].latex} = {number(getattr(flow, name) * factor(name, chute, scales))}${units[name]}"
+        f"${NUMBERS[name].latex} = {style.in_formula(number(value))}${units[name]}"
         for name in PLACE
+        for value in [getattr(flow, name) * factor(name, chute, scales)]
     )
 
 

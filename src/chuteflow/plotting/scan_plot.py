@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -71,13 +71,14 @@ def _over_one(found: Scan, quantity: str, scales: Scales | None) -> Figure:
     figure, (ax,) = style.panels(1, width=4.6, height=3.4)
     ((name, values),) = found.axes.items()
     drawn = found.quantities[quantity] * _by(found, quantity, scales)
+    values, across_label = _axis(found, name, values, scales)
     for i in range(drawn.shape[1]):
         if np.isfinite(drawn[:, i]).any():
             marks = {"linestyle": "none", "marker": "o", "markersize": _SIZE}
             ax.plot(values, drawn[:, i], color=style.stroke(i).colour, label=f"flow {i + 1}", **marks)
     style.spread_scale(ax, "x", [values])
     style.spread_scale(ax, "y", [drawn[np.isfinite(drawn)]])
-    style.name_axes(ax, _label(name), style.label(quantity, scales))
+    style.name_axes(ax, across_label, style.label(quantity, scales))
     style.legend(figure, loc="outside lower center", ncols=4)
     return figure
 
@@ -86,22 +87,45 @@ def _over_two(found: Scan, quantity: str | None, scales: Scales | None) -> Figur
     from matplotlib.ticker import MaxNLocator
 
     figure, (ax,) = style.panels(1, width=5.0, height=3.8)
-    (y, up), (x, across) = found.axes.items()
+    up, across = (_axis(found, name, values, scales) for name, values in found.axes.items())
     if quantity is None:
-        values, label, ticks = found.count.astype(float), "number of flows", MaxNLocator(integer=True)
+        values, label = found.count.astype(float), "number of flows"
     else:
         values = found.quantities[quantity][..., 0] * _by(found, quantity, scales)[..., 0]
-        label, ticks = f"{style.label(quantity, scales)} of the hottest flow", None
+        label = f"{style.label(quantity, scales)} of the hottest flow"
     # Where a point failed nothing is known.
     shown = np.ma.masked_invalid(np.where(found.status <= 1, values, np.nan))
-    shades = ax.pcolormesh(across, up, shown, cmap="viridis", shading="nearest")
-    for axis, one in (("x", across), ("y", up)):
+    for axis, (one, _) in (("x", across), ("y", up)):
         style.spread_scale(ax, axis, [one])
-    bar = figure.colorbar(shades, ax=ax, pad=0.02, ticks=ticks)
+    edges = (_edges(across[0], ax.get_xscale() == "log"), _edges(up[0], ax.get_yscale() == "log"))
+    shades = ax.pcolormesh(*edges, shown, cmap="viridis", **(_counts(shown) if quantity is None else {}))
+    bar = figure.colorbar(shades, ax=ax, pad=0.02)
+    if quantity is None:
+        bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+        bar.ax.minorticks_off()
     bar.set_label(label, fontsize=8.5, fontfamily="STIXGeneral", math_fontfamily="stix")
     bar.ax.tick_params(labelsize=7.5, width=0.6, length=3.0, labelfontfamily="STIXGeneral")
-    style.name_axes(ax, _label(x), _label(y))
+    style.name_axes(ax, across[1], up[1])
     return figure
+
+
+def _counts(shown: np.ma.MaskedArray) -> dict[str, Any]:
+    """Settings of the shades of whole numbers: one for each."""
+    from matplotlib.colors import BoundaryNorm
+
+    counts = np.asarray(shown.compressed())
+    low, high = (int(counts.min()), int(counts.max())) if counts.size else (0, 1)
+    return {"norm": BoundaryNorm(np.arange(low, high + 2) - 0.5, 256)}
+
+
+def _edges(centres: np.ndarray, logarithmic: bool) -> np.ndarray:
+    """The edges of cells around ``centres``, halfway between them as the axis shows it."""
+    if len(centres) == 1:
+        return centres[0] * np.array([0.9, 1.1])
+    places = np.log(centres) if logarithmic else centres
+    inner = 0.5 * (places[1:] + places[:-1])
+    edges = np.concatenate([[2.0 * places[0] - inner[0]], inner, [2.0 * places[-1] - inner[-1]]])
+    return np.exp(edges) if logarithmic else edges
 
 
 def _by(found: Scan, quantity: str, scales: Scales | None) -> np.ndarray:
@@ -111,10 +135,16 @@ def _by(found: Scan, quantity: str, scales: Scales | None) -> np.ndarray:
     return by if by.ndim else by.reshape((*(1 for _ in found.axes), 1))
 
 
-def _label(name: str) -> str:
+def _axis(found: Scan, name: str, values: np.ndarray, scales: Scales | None) -> tuple[np.ndarray, str]:
+    """The values of an axis and its label; in SI units where the chutes have one slope, which the scales need."""
     if name in BY_KEY:
-        return f"{BY_KEY[name].noun}, ${BY_KEY[name].latex}$"
-    return style.label(CONDITIONS[name].quantity)
+        return values, f"{BY_KEY[name].noun}, ${BY_KEY[name].latex}$"
+    quantity = CONDITIONS[name].quantity
+    if scales is None:
+        return values, style.label(quantity)
+    if "slope" in found.axes:
+        return values, f"{style.label(quantity)} (dimensionless)"
+    return values * scales.factor(quantity, float(found.fixed["slope"])), style.label(quantity, scales)
 
 
 def _require(quantity: str) -> None:

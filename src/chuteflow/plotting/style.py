@@ -280,6 +280,12 @@ def power_of_ten(value: float) -> str:
     return rf"$\mathdefault{{{times}10^{{{int(exponent)}}}}}$"
 
 
+def in_formula(number: str) -> str:
+    """A printed number inside a formula: "1.2e-05" with its power of ten raised."""
+    digits, _, exponent = number.partition("e")
+    return rf"{digits}\times10^{{{int(exponent)}}}" if exponent else digits
+
+
 def sentence(text: str) -> Figure:
     """A figure that holds nothing but a sentence."""
     figure, (ax,) = panels(1, height=1.2)

@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+from chuteflow import display
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
-from chuteflow.steady.chute import Chute
-from chuteflow.steady.quantities import Scales
+from chuteflow.steady.chute import Chute, slope_of
+from chuteflow.steady.quantities import GRAINS, Scales
 
 #: How a number of a case is known.
 MEASURED, GUESSED, DEFINED = "measured", "guessed", "defined"
-#: Numbers of the grains, arguments of :class:`chuteflow.Scales`, and their SI units.
-GRAINS = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
 
 
 @dataclass(frozen=True)
@@ -52,16 +51,18 @@ class Case:
     grains: Mapping[str, CaseNumber] = field(default_factory=dict)
 
     def chute(self, **others: Any) -> Chute:
-        """The chute of this case, with ``others``, arguments of :class:`chuteflow.Chute`, in the place of its own.
+        """The chute of this case, with ``others`` in the place of its own: arguments of :class:`chuteflow.Chute`, the
+        short ``e`` and ``ew``, or ``angle`` in degrees for the slope.
 
         Raises:
-            InputError: for a number that neither says, or one out of range.
+            InputError: for a number that neither says, one that is given twice, unknown or out of range.
         """
         values: dict[str, Any] = {BY_KEY[key].name: known.value for key, known in self.numbers.items()}
-        values |= dict(self.names) | others
+        values |= dict(self.names) | _arguments(others)
         missing = [one.name for one in BY_KEY.values() if one.name not in values]
         if missing:
-            raise InputError(f"{self.name} has no {' and no '.join(missing)}: give it")
+            asked = ", ".join(map(_asked, missing))
+            raise InputError(f"{self.name} has no {' and no '.join(missing)}: give {asked}")
         return Chute(**values)
 
     @property
@@ -73,6 +74,46 @@ class Case:
     def __repr__(self) -> str:
         said = ", ".join(f"{key} = {known.value:g}" for key, known in self.numbers.items())
         return f"<Case: {self.name}; {said}>"
+
+    def _repr_html_(self) -> str:
+        known = [(key, "", one) for key, one in self.numbers.items()]
+        known += [(key, GRAINS[key], one) for key, one in self.grains.items()]
+        rows = [
+            [
+                key,
+                f"{one.value:g} {unit}",
+                "" if one.uncertainty is None else f"{one.uncertainty:g}",
+                one.how,
+                one.source,
+            ]
+            for key, unit, one in known
+        ]
+        rows += [[key, name, "", "", ""] for key, name in self.names.items()]
+        header = ["", "value", "uncertainty", "known", "source"]
+        return display.html_table(f"{self.name}: {self.description}", header, rows)
+
+
+def _arguments(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What is given of a chute, by the names of :class:`chuteflow.Chute`."""
+    names = [one.name for one in fields(Chute)]
+    found: dict[str, Any] = {}
+    for key, value in given.items():
+        name = "slope" if key == "angle" else BY_KEY[key].name if key in BY_KEY else key
+        if name not in names:
+            raise InputError(f"unknown argument {key!r}: {nearest_names(key, [*names, 'angle', 'e', 'ew'])}")
+        if name in found:
+            raise InputError(f"{name} is given twice, also as {key}")
+        found[name] = slope_of(value) if key == "angle" else value
+    return found
+
+
+def _asked(name: str) -> str:
+    return "slope=... (or angle=... in degrees)" if name == "slope" else f"{name}=..."
+
+
+def cases() -> dict[str, Case]:
+    """All cases by name: chutes of the paper, and common materials."""
+    return dict(CASES)
 
 
 def case(name: str) -> Case:

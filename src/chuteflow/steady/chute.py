@@ -15,6 +15,7 @@ from chuteflow.theory.laws import law
 
 #: Surface conditions: the half-line (2.16), or the interface of Jenkins & Hanes (3.31)-(3.32).
 SURFACES = ("free", "interface")
+_SURFACES = {"free": "free surface", "interface": "interface with free grains above"}
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,8 @@ class Chute:
 
     Args:
         slope: tan(theta) > 0.
-        restitution: e of two grains, 0 < e <= 1.
-        wall_restitution: e_w of a grain and the base, 0 <= e_w <= 1.
+        restitution: e, the coefficient of restitution of two grains, 0 < e <= 1.
+        wall_restitution: e_w, the coefficient of restitution of a grain and the base, 0 <= e_w <= 1.
         roughness: r of (2.8), 1/2 <= r <= sqrt(3)/2.
         surface: "free" or "interface".
         closure: the constitutive law: its name, a text such as "extended:packing=0.64" or "grains.py:OWN" (see
@@ -54,13 +55,13 @@ class Chute:
             require_positive(self.law, self.restitution, self.slope)
 
     @classmethod
-    def at_angle(cls, degrees: float, **others: Any) -> Chute:
-        """A chute inclined by ``degrees``, 0 < degrees < 90; the other arguments as for Chute.
+    def at_angle(cls, degrees: float, *others: Any, **named: Any) -> Chute:
+        """A chute inclined by ``degrees``, 0 < degrees < 90; the other arguments as for Chute, in their order or named.
 
         Raises:
             InputError: for an angle out of range.
         """
-        return cls(slope=slope_of(degrees), **others)
+        return cls(slope_of(degrees), *others, **named)
 
     @property
     def e(self) -> float:
@@ -81,6 +82,13 @@ class Chute:
     def law(self) -> Law:
         """The constitutive law that its closure means now."""
         return law(self.closure)
+
+    @property
+    def summary(self) -> str:
+        """All parameters on one line, in words and symbols."""
+        slope, *others = (f"{one.symbol} = {getattr(self, name):g}" for name, one in PARAMETERS.items())
+        numbers = ", ".join([f"{slope} ({self.angle:.4g} degrees)", *others])
+        return f"{numbers}, {_SURFACES[self.surface]}, {self.laws}"
 
     @property
     def laws(self) -> str:

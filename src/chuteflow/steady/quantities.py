@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from chuteflow.amounts import bare, is_like, positive_amount, read_si
 from chuteflow.checks import number
 from chuteflow.errors import InputError
 
@@ -242,37 +244,63 @@ QUANTITIES: dict[str, Quantity] = FIELDS | NUMBERS
 #: All that has a scale.
 SCALED: dict[str, Quantity] = QUANTITIES | DISTURBANCES
 
+#: What is known of the grains, arguments of :class:`Scales`, and the SI units.
+GRAINS = {"diameter": "m", "density": "kg/m^3", "gravity": "m/s^2"}
+#: Quantities of mass that may be given by volume of the grains: their units times that of a density.
+_BY_VOLUME = {"mass_flux": "m^2/s", "mass_holdup": "m"}
+
 
 @dataclass(frozen=True)
 class Scales:
     """Grain diameter (m), grain density (kg/m^3) and gravity (m/s^2), with which results take SI units.
 
-    Lengths scale with the diameter d, time with sqrt(d/(g cos theta)), densities with that of a grain
-    (section 3.1).
+    Each is a number in SI units, or a text with a unit such as "1 mm" or "2.5 g/cm^3". Lengths scale with the
+    diameter d, time with sqrt(d/(g cos theta)), densities with that of a grain (section 3.1).
 
     Raises:
-        InputError: for a scale that is not positive.
+        InputError: for a scale that is not positive, or a unit of another kind.
     """
 
     diameter: float
     density: float
     gravity: float = 9.81
 
+    if TYPE_CHECKING:
+
+        def __init__(self, diameter: float | str, density: float | str, gravity: float | str = 9.81) -> None: ...
+
     def __post_init__(self) -> None:
-        for name in ("diameter", "density", "gravity"):
-            value = number(name, getattr(self, name))
-            if value <= 0.0:
-                raise InputError(f"{name} = {value}: must be a positive number")
-            object.__setattr__(self, name, value)
+        for name, unit in GRAINS.items():
+            value = getattr(self, name)
+            if isinstance(value, str) and bare(value):
+                raise InputError(f"{name} = {value!r}: must be a number, in {unit}, or a text with a unit")
+            object.__setattr__(self, name, positive_amount(name, value, unit))
 
     def factor(self, name: str, slope: float) -> float:
         """What the dimensionless quantity ``name`` on a chute of ``slope`` is multiplied with for SI units.
 
         Raises:
-            InputError: for an unknown quantity.
+            InputError: for an unknown quantity, or a slope that is no number.
         """
         if name not in SCALED:
             raise InputError(f"unknown quantity {name!r}: choose one of {', '.join(SCALED)}")
         of_density, of_diameter, of_acceleration = SCALED[name].dimension
-        acceleration = self.gravity / math.hypot(1.0, slope)
+        acceleration = self.gravity / math.hypot(1.0, number("slope", slope))
         return self.density**of_density * self.diameter**of_diameter * acceleration**of_acceleration
+
+    def dimensionless(self, name: str, amount: float | str, slope: float, what: str | None = None) -> float:
+        """The quantity ``name`` on a chute of ``slope``, given in SI units as a number, or with a unit as in
+        "0.5 kg/m/s".
+
+        A mass flux may be given in m^2/s and a hold-up in m, which is then the volume of the grains alone. Messages
+        call it ``what``.
+
+        Raises:
+            InputError: for an unknown quantity, text that is no amount, or a unit of another kind.
+        """
+        by, unit, density = self.factor(name, slope), SCALED[name].unit, 1.0
+        if not isinstance(amount, str):
+            return number(name, amount) / by
+        if name in _BY_VOLUME and is_like(amount, _BY_VOLUME[name]):
+            unit, density = _BY_VOLUME[name], self.density
+        return read_si(what or name, amount, unit) * density / by

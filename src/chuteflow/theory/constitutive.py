@@ -290,10 +290,10 @@ def reduce(law: Law, x: Field, e: float, slope: float) -> Reduced:
 
 def dilute_drift(law: Law, e: float, slope: float) -> Any:
     """b, the limit of -nu g4/g3 where dilute, for one e or many: 0 but for laws whose g4 grows like 1/nu."""
-    return _drift_of(law, e, slope) if isinstance(e, float) and isinstance(slope, float) else _find_drift(law, e, slope)
+    return _dilute_drift(law, e, slope) if np.ndim(e) or np.ndim(slope) else _drift_of_one(law, e, slope)
 
 
-def _find_drift(law: Law, e: float, slope: float) -> Any:
+def _dilute_drift(law: Law, e: Any, slope: Any) -> Any:
     _, _, g = law.at(np.zeros(1), e, slope)
     if g.density_flux is None:
         return 0.0
@@ -301,8 +301,7 @@ def _find_drift(law: Law, e: float, slope: float) -> Any:
     return b if np.ndim(e) else b[0]
 
 
-# One chute asks for it several times.
-_drift_of = lru_cache(maxsize=64)(_find_drift)
+_drift_of_one = lru_cache(maxsize=64)(_dilute_drift)
 
 
 def require_limit(law: Law, e: float, slope: float, what: str) -> None:

@@ -77,18 +77,7 @@ def command(**given: Any) -> None:
             **chosen,
             **search,
         )
-    if given["as_json"]:
-        from chuteflow.io import contract
-        from chuteflow.io.boundary_records import boundaries_object
-
-        answer = contract.text(boundaries_object(found, scales))
-    else:
-        answer = "\n".join(_report(found, second, scales))
-
-    def save(path: str) -> None:
-        from chuteflow.io import boundary_records
-
-        boundary_records.save(found, path, scales=scales)
+    from chuteflow.io.boundary_records import boundaries_object
 
     def plotted() -> Figure:
         from chuteflow.bifurcations.diagram import diagram
@@ -96,7 +85,13 @@ def command(**given: Any) -> None:
 
         return plot_boundaries(diagram(found, _UPRIGHT[upright]), scales=scales) if len(found) else plot_none(found)
 
-    options.deliver(given, answer, save, plotted)
+    options.deliver(
+        given,
+        lambda: boundaries_object(found, scales),
+        _report(found, second, scales),
+        options.saver(found, scales),
+        plotted,
+    )
 
 
 def _chute(given: Mapping[str, Any], second: str) -> tuple[tuple[float, float], Any]:
@@ -158,10 +153,7 @@ def _points(boundary: Boundary, second: str, scales: Scales | None) -> str:
         *((turn.kind, turn.flow, TURNS[turn.kind]) for turn in boundary.special),
         ("ends", boundary.flows[-1], boundary.ends[1]),
     ]
-    header = [
-        [*start, *cells, ""]
-        for start, cells in zip((("", second), ("", "[1]")), tables.heading(contract.PLACE, scales), strict=False)
-    ]
+    header = tables.heading(contract.PLACE, scales, before=(("", ""), (second, "1")), after=(("", ""),))
     rows = [
         [
             kind,

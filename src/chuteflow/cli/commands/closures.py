@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -61,12 +61,10 @@ def command(name: str | None, **given: Any) -> None:
     options.deliver_object(given, whole, _report(chosen, e, slope), lambda: _rows(whole), plotted)
 
 
-def _rows(whole: dict[str, Any]) -> Iterator[list[str]]:
-    """The functions at each volume fraction as rows of CSV."""
+def _rows(whole: dict[str, Any]) -> Iterator[Sequence[Any]]:
+    """The functions at each volume fraction as rows."""
     yield ["nu", *whole["functions"]]
-    for i, nu in enumerate(whole["nu"]):
-        values = (column[i] for column in whole["functions"].values())
-        yield [repr(nu), *("" if value is None else repr(value) for value in values)]
+    yield from zip(whole["nu"], *whole["functions"].values(), strict=True)
 
 
 def _everything() -> dict[str, Any]:

@@ -54,7 +54,9 @@ _SAVED = (".json", ".csv")
 )
 @options.option("--roughness", type=options.Number(), help="Roughness r, instead of that of the run.")
 @options.option(
-    "--ew", type=options.Number(), help="Restitution of a grain and the base, where the run does not give it."
+    "--ew",
+    type=options.Number(),
+    help="Coefficient of restitution of a grain and the base, if not in the run.",
 )
 @options.option("--fit", metavar="NAMES", help="Find these parameters from the profiles too, such as e,ew,roughness.")
 @options.output_options(_SAVED, "profiles and functions")
@@ -79,7 +81,7 @@ def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
 
 def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[str, Recovery | str]]:
     """For each closure the fit, or why there is none."""
-    from chuteflow.dem.recovery import recovered
+    from chuteflow.dem.recovery import recover
     from chuteflow.errors import ChuteflowError
     from chuteflow.steady.free import chosen_parameters
 
@@ -90,7 +92,7 @@ def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[
     found: list[tuple[str, Recovery | str]] = []
     for closure in closures:
         try:
-            found.append((closure, recovered(measured, closure, names)))
+            found.append((closure, recover(measured, closure, names)))
         except ChuteflowError as error:
             found.append((closure, str(error)))
     return found
@@ -147,7 +149,7 @@ def _content(found: Comparison) -> dict[str, Any]:
                 "theory": finite(one.theory),
                 "relative": finite(one.relative),
                 "relative_error": finite(one.error),
-                "verdict": one.verdict,
+                "verdict": one.agreement,
             }
             for one in rows
         ]

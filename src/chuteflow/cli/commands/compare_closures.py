@@ -71,18 +71,15 @@ def _content(found: Sequence[FlowSet], scales: Scales | None) -> dict[str, Any]:
     return {"chute": _without_closure(sets[0]["chute"]), "closures": sets}
 
 
-def _rows(content: dict[str, Any]) -> Iterator[list[str]]:
-    """Every flow under every law as a row of CSV."""
+def _rows(content: dict[str, Any]) -> Iterator[list[Any]]:
+    """Every flow under every law as a row."""
     from chuteflow.steady.quantities import NUMBERS
 
     symbols = [quantity.symbol for quantity in NUMBERS.values()]
     yield ["closure", *symbols, "error"]
     for one in content["closures"]:
-        # A name with commas is a cell in quotes.
-        name = one["chute"]["closure"]
         for flow in one["flows"]:
-            cells = (flow[symbol] for symbol in (*symbols, "error"))
-            yield [f'"{name}"', *("" if cell is None else repr(cell) for cell in cells)]
+            yield [one["chute"]["closure"], *(flow[symbol] for symbol in (*symbols, "error"))]
 
 
 def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:
@@ -92,15 +89,11 @@ def _without_closure(chute: dict[str, Any]) -> dict[str, Any]:
 def _report(found: Sequence[FlowSet], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
-    yield words.chute(found[0].chute).rpartition(", closure")[0]
-    if scales is not None:
-        yield words.scales(scales)
+    first, *rest = words.introduction(found[0].chute, scales)
+    yield from (first.rpartition(", closure")[0], *rest)
     yield ""
-    ends = (("closure", "error", "validity"), ("", "[1]", ""))
-    header = [
-        [first, *cells, error, validity]
-        for (first, error, validity), cells in zip(ends, tables.heading(("mass_flux", *_COLUMNS), scales), strict=False)
-    ]
+    after = (("error", "1"), ("validity", ""))
+    header = tables.heading(("mass_flux", *_COLUMNS), scales, before=(("closure", ""),), after=after)
     rows: list[list[str]] = []
     for flow_set in found:
         name = str(flow_set.chute.closure)

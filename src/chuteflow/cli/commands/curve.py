@@ -46,24 +46,6 @@ def command(**given: Any) -> None:
     stability = _mark_stability(found, given["samples"]) if given["stability"] else None
     if stability is not None:
         found = stability.curve
-    if given["as_json"]:
-        from chuteflow.io import contract
-
-        content = contract.curve_object(found, scales) | near
-        if stability is not None:
-            from chuteflow.io.stability_curve import changes_objects, samples_objects
-
-            objects = samples_objects(stability, scales), changes_objects(stability, scales)
-            for branch, samples, changes in zip(content["branches"], *objects, strict=True):
-                branch["stability"], branch["stability_changes"] = samples, changes
-        answer = contract.text(content)
-    else:
-        answer = "\n".join(_report(found, stability, lines, scales))
-
-    def save(path: str) -> None:
-        from chuteflow.io import files
-
-        files.save(found, path, scales=scales)
 
     def plotted() -> Figure:
         from chuteflow.plotting.plots import plot_curve
@@ -71,7 +53,26 @@ def command(**given: Any) -> None:
 
         return plot_curve(found, scales=scales) if stability is None else plot_marked(stability, scales=scales)
 
-    options.deliver(given, answer, save, plotted)
+    options.deliver(
+        given,
+        lambda: _content(found, stability, scales) | near,
+        _report(found, stability, lines, scales),
+        options.saver(found, scales),
+        plotted,
+    )
+
+
+def _content(found: Curve, stability: MarkedCurve | None, scales: Scales | None) -> dict[str, Any]:
+    from chuteflow.io.contract import curve_object
+
+    content = curve_object(found, scales)
+    if stability is not None:
+        from chuteflow.io.stability_curve import changes_objects, samples_objects
+
+        objects = samples_objects(stability, scales), changes_objects(stability, scales)
+        for branch, samples, changes in zip(content["branches"], *objects, strict=True):
+            branch["stability"], branch["stability_changes"] = samples, changes
+    return content
 
 
 def _mark_stability(found: Curve, samples: int | None) -> MarkedCurve:
@@ -87,9 +88,7 @@ def _mark_stability(found: Curve, samples: int | None) -> MarkedCurve:
 def _report(found: Curve, stability: MarkedCurve | None, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
 
-    yield words.chute(found.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(found.chute, scales)
     for i, branch in enumerate(found.branches, 1):
         yield ""
         yield f"branch {i} of {len(found.branches)}, {len(branch.flows)} flows"
@@ -100,12 +99,7 @@ def _report(found: Curve, stability: MarkedCurve | None, near: Sequence[str], sc
     yield ""
     if found.branches:
         yield words.multiplicity(found, scales)
-    else:
-        yield words.in_own_units(f"no flow: {found.reason}", scales)
-        yield from near
-    if found.incomplete:
-        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
-    yield words.searched(found.searched, found.chute, scales)
+    yield from words.search_outcome(found, scales, near)
 
 
 def _stretches(branch: MarkedBranch, found: Curve, scales: Scales | None) -> str:
@@ -127,6 +121,6 @@ def _points(branch: Branch, found: Curve, scales: Scales | None) -> str:
         *((point.kind, point.flow, KINDS[point.kind]) for point in branch.special),
         ("ends", branch.flows[-1], words.in_own_units(branch.ends[1], scales)),
     ]
-    header = [["", *cells, ""] for cells in tables.heading(contract.PLACE, scales)]
+    header = tables.heading(contract.PLACE, scales, before=(("", ""),), after=(("", ""),))
     rows = [[kind, *tables.numbers(flow, contract.PLACE, found.chute, scales), what] for kind, flow, what in chosen]
     return tables.table([*header, *rows], words=(0, len(contract.PLACE) + 1))

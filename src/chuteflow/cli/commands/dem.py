@@ -179,8 +179,9 @@ def waves_command(source: str, **given: Any) -> None:
     grown = waves.growth(fitted)
     click.echo(
         f"a wave of length {number(2.0 * math.pi / found.wavenumber)}, k = {number(found.wavenumber)}, from t = "
-        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)}, frequency "
-        f"{number(grown.frequency)}; that explains {100.0 * grown.share:.3g} % of its mean square"
+        f"{fitted.times[0]:.4g} to {fitted.times[-1]:.4g}: rate {number(grown.rate)} ± {grown.rate_error:.1g}, "
+        f"frequency {number(grown.frequency)} ± {grown.frequency_error:.1g}; that explains "
+        f"{100.0 * grown.explained:.3g} % of its mean square"
     )
     if given["save"] is not None:
         write_whole(given["save"], waves.written(found))
@@ -206,14 +207,14 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
             found.append(one)
             progress.show(f"{len(found)} flows compared")
     text = tables.table(table(found, names), words=(0, 5))
-    options.deliver(given, text, None, lambda: plot_results(found))
+    options.deliver({**given, "as_json": False}, dict, [text], None, lambda: plot_results(found))
 
 
 def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
     from chuteflow.dem.contacts import Bounds
     from chuteflow.dem.scene import Scene
     from chuteflow.dem.script import Schedule
-    from chuteflow.dem.start import like_theory
+    from chuteflow.dem.start import start_near_theory
 
     if given["holdup"] is None:
         raise InputError("missing --holdup, the mass hold-up M, for example --holdup 1.264")
@@ -237,7 +238,7 @@ def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
         own["base"] = given["bumps_base"]
     scene = Scene(chute, given["holdup"], bounds=bounds, **own)
     if scene.start == "hot" and given["temperature"] is None and given["velocity"] is None:
-        scene = like_theory(scene)
+        scene = start_near_theory(scene)
     times = {name: given[name] for name in ("settle", "measure", "block", "frame") if given[name] is not None}
     return scene, Schedule(**times)
 
@@ -322,7 +323,7 @@ def _numbers(measured: Measured) -> Iterator[str]:
     for name, one in measured.drifts.items():
         yield (
             f"drift of {name.replace('_', ' ')}: {100.0 * one.value:+.2f} ± {100.0 * one.error:.2f} % in 300 time "
-            f"units: {one.verdict}"
+            f"units: {one.steadiness}"
         )
 
 

@@ -15,6 +15,7 @@ from chuteflow.parameters import CONDITIONS
 
 if TYPE_CHECKING:
     from chuteflow.fitting.design import Design
+    from chuteflow.steady.quantities import Scales
 
 _EPILOG = (
     "Give one condition more than there are unknown parameters: the flow on each chute is unknown too.\n\n"
@@ -29,31 +30,40 @@ _COLUMNS = ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature",
 @options.condition_options
 @click.option("--want", metavar="NAME=VALUE", multiple=True, help="Another number of the flow, such as depth=10.")
 @click.option("--range", "ranges", type=NamedRangeType(), multiple=True, help="Where an unknown parameter is tried.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@options.quiet_option
+@options.output_options((".csv", ".json"), None)
 def command(**given: Any) -> None:
-    """Search and print."""
+    """Search, print and save."""
+    options.require_outputs(given, (".csv", ".json"))
     unknown = [name.strip() for name in (given["unknown"] or "").split(",") if name.strip()]
     if not unknown:
         raise InputError("missing --unknown: which parameters are to be found, for example --unknown slope?")
     chute = chute_with(given, unknown)
-    wanted = _wanted(given)
+    scales = options.scales(given)
+    wanted = _wanted(given, None if "slope" in unknown else chute.slope, scales)
     from chuteflow.fitting.design import design
-    from chuteflow.io import contract
-    from chuteflow.io.fit_records import design_object
+    from chuteflow.io.fit_records import design_object, design_rows
 
     found = design(chute, unknown, ranges=dict(given["ranges"]), **wanted)
-    click.echo(contract.text(design_object(found)) if given["as_json"] else "\n".join(_report(found)))
+    content = design_object(found, scales)
+    options.deliver_object(given, content, _report(found, scales), lambda: design_rows(found, scales), None)
 
 
-def _wanted(given: dict[str, Any]) -> dict[str, float]:
+def _wanted(given: dict[str, Any], slope: float | None, scales: Scales | None) -> dict[str, float]:
+    """The numbers that the flow is to have, dimensionless; ``slope`` is None where it is unknown."""
     from chuteflow.checks import number_in
 
     found = {}
     for condition in CONDITIONS.values():
         if given[condition.option] is not None:
             option = f"--{condition.option.replace('_', '-')}"
-            found[condition.key] = number_in(option, given[condition.option], condition.low, condition.high)
+            value: Any = given[condition.option]
+            if slope is not None:
+                value = options.amount(given, condition.option, condition.quantity, slope, scales)
+            elif options.without_unit(value)[1]:
+                raise InputError(
+                    f"{option} {value}: the scales of a unit need the slope, which is unknown: omit the unit"
+                )
+            found[condition.key] = number_in(option, value, condition.low, condition.high)
     for text in given["want"]:
         name, equals, value = text.partition("=")
         if not equals or name.strip() in found:
@@ -62,16 +72,19 @@ def _wanted(given: dict[str, Any]) -> dict[str, float]:
     return found
 
 
-def _report(found: Design) -> Iterator[str]:
-    from chuteflow.io import tables
+def _report(found: Design, scales: Scales | None) -> Iterator[str]:
+    from chuteflow.io import tables, words
 
     if found.reason:
         yield f"no solution: {found.reason}"
         return
-    rows = [["", *(p.key for p in found.unknown), *tables.heading(_COLUMNS, None)[0], "validity"]]
+    before = [("", ""), *((parameter.key, "") for parameter in found.unknown)]
+    rows = tables.heading(_COLUMNS, scales, before=before, after=(("validity", ""),))
     for i, one in enumerate(found.solutions, 1):
-        cells = tables.numbers(one.flow, _COLUMNS, one.flow.chute, None)
+        cells = tables.numbers(one.flow, _COLUMNS, one.flow.chute, scales)
         rows.append([str(i), *map(tables.number, one.values.tolist()), *cells, one.flow.validity.summary])
     yield tables.table(rows, words=(len(rows[0]) - 1,))
     yield ""
+    if scales is not None:
+        yield words.scales(scales)
     yield f"found from {found.starts} flows of trial chutes; there may be others"

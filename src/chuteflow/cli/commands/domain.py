@@ -81,25 +81,20 @@ def command(**given: Any) -> None:
             **chosen,
             **search,
         )
-    if given["as_json"]:
-        from chuteflow.io import contract
-        from chuteflow.io.domain_records import domain_object, in_si
-
-        answer = contract.text(domain_object(found) | in_si(found, scales))
-    else:
-        answer = "\n".join(_report(found, scales))
-
-    def save(path: str) -> None:
-        from chuteflow.io import files
-
-        files.save(found, path)
+    from chuteflow.io.domain_records import domain_object, in_si
 
     def plotted() -> Figure:
         from chuteflow.plotting.domain_plot import plot_domain
 
         return plot_domain(found)
 
-    options.deliver(given, answer, save, plotted)
+    options.deliver(
+        given,
+        lambda: domain_object(found) | in_si(found, scales),
+        _report(found, scales),
+        options.saver(found),
+        plotted,
+    )
 
 
 def _plane(given: Mapping[str, Any]) -> tuple[Any, Any, Chute]:

@@ -46,8 +46,8 @@ _EPILOG = (
 def command(**given: Any) -> None:
     """Write a page, or serve one until interrupted."""
     if given["export"] is None:
-        query = _address_query(given)
-        _serve(given, query, _data(given))
+        state = _first_state(given)
+        _serve(given, state, _data(given))
     else:
         _export(given)
 
@@ -109,14 +109,12 @@ def _flux(given: dict[str, Any], slope: float, scales: Scales | None) -> float:
 # --- the server -------------------------------------------------------------------------------------------------------
 
 
-def _address_query(given: dict[str, Any]) -> str:
-    """What of the chute is given, as the query of the page's address.
+def _first_state(given: dict[str, Any]) -> dict[str, Any]:
+    """What of the chute is given, as the page opens with it.
 
     Raises:
         InputError: for what no chute has, and for what the page cannot show.
     """
-    from urllib.parse import urlencode
-
     for name in ("search_temperature", "largest_holdup"):
         if given[name] is not None:
             raise InputError(f"--{name.replace('_', '-')} is the range of a page that is written: give --export too")
@@ -130,7 +128,7 @@ def _address_query(given: dict[str, Any]) -> str:
         state["Q"] = _flux(given, float(state["slope"]), scales)
     if scales is not None:
         state |= {"si": "1", "d": repr(round(1e3 * scales.diameter, 12)), "rho": repr(scales.density)}
-    return f"?{urlencode(state)}" if state else ""
+    return state
 
 
 def _material(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,19 +151,21 @@ def _material(given: Mapping[str, Any]) -> dict[str, Any]:
     return values | {name: str(getattr(whole, name)) for name in options.words(given) if name != "base"}
 
 
-def _serve(given: Mapping[str, Any], query: str, data: list[dict[str, Any]]) -> None:
+def _serve(given: Mapping[str, Any], state: Mapping[str, Any], data: list[dict[str, Any]]) -> None:
     for name in ("starlette", "uvicorn"):
         require(name, "explore", "the explorer")
+    from urllib.parse import urlencode
+
     import uvicorn
 
     from chuteflow.explorer.connections import Connection, Server
-    from chuteflow.explorer.server import LOOPBACK, application, bound
+    from chuteflow.explorer.server import LOOPBACK, application, bind_socket
 
     address = given["host"] or "127.0.0.1"
-    listener = bound(address, given["port"])
+    listener = bind_socket(address, given["port"])
     number = listener.getsockname()[1]
     shown = f"[{address}]" if ":" in address else address
-    page = f"http://{shown}:{number}/{query}"
+    page = f"http://{shown}:{number}/{'?' if state else ''}{urlencode(state)}"
     hosts = LOOPBACK
     if address not in LOOPBACK:
         click.echo(f"chuteflow: anyone who reaches {address} can use this server", err=True)
@@ -175,7 +175,7 @@ def _serve(given: Mapping[str, Any], query: str, data: list[dict[str, Any]]) -> 
         click.echo(
             "Its first answers come in a few seconds, or in about half a minute where the search is compiled first"
         )
-    served = application(hosts, data=data)
+    served = application(hosts, data=data, first=state)
     settings = uvicorn.Config(
         served, http=Connection, ws="none", log_level="error", lifespan="on", timeout_graceful_shutdown=1
     )

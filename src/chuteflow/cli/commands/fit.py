@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from chuteflow.fitting.calibration import Fit
     from chuteflow.fitting.comparison import LawComparison
     from chuteflow.steady.chute import Chute
+    from chuteflow.steady.quantities import Scales
 
 _EPILOG = (
     "Columns of the file: z, nu, T, u, numbers of the flow such as Q, M, h, depth, and errors such as nu_error or "
@@ -26,6 +27,8 @@ _EPILOG = (
     "--density.\n\n"
     "Example: chuteflow fit profile.csv --slope 0.3 --free e,ew,roughness --plot fit.png"
 )
+#: What is told of the flow of each experiment.
+_PLACE = ("mass_flux", "centre_of_mass", "mass_holdup")
 #: What free parameters of a chute are tried at first, where nothing is said.
 _FIRST = {"slope": 0.3, "e": 0.8, "ew": 0.8, "roughness": 0.6}
 #: Parts of the depth for which residuals are summed up.
@@ -79,8 +82,7 @@ def command(**given: Any) -> None:
     chute = chute_with(given, [*free, "slope"], closure=closures[0], settings=())
     scales = options.scales(given)
     from chuteflow.fitting.comparison import compare
-    from chuteflow.io import contract
-    from chuteflow.io.fit_records import comparison_object
+    from chuteflow.io.fit_records import comparison_object, save_fit
     from chuteflow.io.measurements_file import read_measurements
 
     slope = None if given["slope"] is None and given["angle"] is None else chute.slope
@@ -90,15 +92,6 @@ def command(**given: Any) -> None:
     settings: dict[str, Any] = {"base_height": given["base_height"], "ranges": dict(given["ranges"])}
     settings |= {name: given[name] for name in ("loss", "confidence", "trials") if given[name] is not None}
     found = compare(measured, chute, free, closures, **settings)
-    if given["as_json"]:
-        answer = contract.text(comparison_object(found.fits, found.failed))
-    else:
-        answer = "\n".join(_report(found))
-
-    def save(path: str) -> None:
-        from chuteflow.io.fit_records import save_fit
-
-        save_fit(found.fits[0], path)
 
     def plotted() -> Figure:
         from chuteflow.plotting.fit_plot import plot_fit
@@ -113,7 +106,14 @@ def command(**given: Any) -> None:
             raise InputError("--direct: no experiment has profiles of nu and T at five common heights")
         return plot_direct(measured_directly)
 
-    options.deliver(given, answer, save, plotted, direct=drawn)
+    options.deliver(
+        given,
+        lambda: comparison_object(found.fits, found.failed),
+        _report(found, scales),
+        lambda path: save_fit(found.fits[0], path),
+        plotted,
+        direct=drawn,
+    )
 
 
 def _names(text: str | None) -> list[str]:
@@ -153,8 +153,9 @@ def _without_roughness(given: Mapping[str, Any]) -> bool:
     return str(given["base"] or "").startswith("johnson-jackson")
 
 
-def _report(found: LawComparison) -> Iterator[str]:
+def _report(found: LawComparison, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
+    from chuteflow.steady.quantities import NUMBERS
 
     best = found.fits[0]
     if len(found.fits) + len(found.failed) > 1:
@@ -173,11 +174,13 @@ def _report(found: LawComparison) -> Iterator[str]:
     yield from _goodness(best)
     for one in best.experiments:
         flow = one.flow
-        place = f"flow {one.rank} of {one.flows} ({flow.name}), Q = {tables.number(flow.mass_flux)}"
-        more = f"h = {tables.number(flow.centre_of_mass)}, M = {tables.number(flow.mass_holdup)}"
+        place = [
+            f"{NUMBERS[name].symbol} = {words.amount(name, getattr(flow, name), flow.chute, scales)}" for name in _PLACE
+        ]
         if one.base is not None:
-            more += f", base at {tables.number(one.base)} +- {tables.number(one.base_error or 0.0)}"
-        yield f"experiment {one.name}: {place}, {more}"
+            base, error = (words.amount("height", at or 0.0, flow.chute, scales) for at in (one.base, one.base_error))
+            place.append(f"base at {base} +- {error}")
+        yield f"experiment {one.name}: flow {one.rank} of {one.flows} ({flow.name}), {', '.join(place)}"
     for other in best.alternatives:
         if not other.fits_as_well:
             at = ", ".join(f"{p.key} = {tables.number(v)}" for p, v in zip(best.free, other.values, strict=True))
@@ -224,7 +227,9 @@ def _residuals(best: Fit) -> Iterator[str]:
     """Mean residuals by height: runs of one sign show where the theory fails."""
     from chuteflow.io import tables
 
-    rows = [["residuals in errors", *(f"height {i + 1} of {_BANDS}" for i in range(_BANDS)), "rms"]]
+    bands = _BANDS if any(one.profiles for one in best.experiments) else 0
+    heights = [f"height {i + 1} of {_BANDS}" for i in range(bands)]
+    rows = [["residuals in errors", *heights, "rms"] if bands else ["residuals in errors", ""]]
     for one in best.experiments:
         for series, residual in one.profiles:
             parts = np.array_split(residual, _BANDS)
@@ -233,7 +238,7 @@ def _residuals(best: Fit) -> Iterator[str]:
         scalars = best.measured.experiments[best.experiments.index(one)].scalars
         values = one.residuals[len(one.residuals) - len(scalars) :]
         for scalar, value in zip(scalars, values, strict=True):
-            rows.append([f"{one.name}: {scalar.symbol}", f"{value:+.2f}", *[""] * (_BANDS - 1), ""])
+            rows.append([f"{one.name}: {scalar.symbol}", f"{value:+.2f}", *[""] * bands])
     yield tables.table(rows, words=(0,))
 
 

@@ -29,7 +29,7 @@ _EPILOG = (
 @click.command("growth", help=COMMANDS["growth"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
-@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.flow_option
 @options.option(
     "--kx",
     type=options.IntervalType(units=True),
@@ -45,13 +45,9 @@ def command(**given: Any) -> None:
     scales = options.scales(given)
     condition: dict[str, Any] = options.condition(given, chute, scales)
     kx, ky = (options.own(given, name, "wavenumber", chute.slope, scales) for name in ("kx", "ky"))
-    from chuteflow.branches.enumeration import flows
-
-    found = flows(chute, **condition)
-    if not len(found):
-        options.deliver_without_flow(given, found, condition, scales, {"flow": None})
+    flow = options.solve_one(given, chute, condition, scales, {"flow": None})
+    if flow is None:
         return
-    flow = options.chosen(found, given["which"])
     from chuteflow.io.growth_records import wave_object, wave_rows
     from chuteflow.stability.planes import wave_map
 
@@ -91,9 +87,7 @@ def _report(found: WaveMap, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
     flow = found.flow
-    yield words.chute(flow.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(flow.chute, scales)
 
     def said(name: str, value: float) -> str:
         return words.amount(name, value, flow.chute, scales)

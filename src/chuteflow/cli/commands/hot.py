@@ -99,21 +99,19 @@ def _content(found: HotModel, scales: Scales | None) -> dict[str, Any]:
     return content | contract.units_object(scales, ()) | {"units": units}
 
 
-def _rows(content: dict[str, Any]) -> Iterator[list[str]]:
-    """Names and numbers, one in a row of CSV."""
+def _rows(content: dict[str, Any]) -> Iterator[list[Any]]:
+    """Names and numbers, one in a row."""
     yield ["name", "value"]
     for name, value in content.items():
         if isinstance(value, bool | int | float) or value is None:
-            yield [name, "" if value is None else str(value)]
+            yield [name, value]
 
 
 def _report(found: HotModel, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
 
     numbers = found.as_dict()
-    yield words.chute(found.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(found.chute, scales)
     yield ""
     values = {name: math.inf if numbers[name] is None else numbers[name] for name in _PARAMETERS}
     rows = [[name, tables.number(values[name]), what] for name, what in _PARAMETERS.items()]

@@ -92,9 +92,7 @@ def _report(found: FamilyMap, scales: Scales | None) -> Iterator[str]:
 
     first, last = found.flows[0], found.flows[-1]
     low, high = (tables.number(float(found.depth_wavenumber[end])) for end in (0, -1))
-    yield words.chute(found.flows[0].chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(found.flows[0].chute, scales)
     yield (
         f"branch: {_place(first, scales)} to {_place(last, scales)}; waves at {found.angle:g} degrees to the slope, "
         f"k h from {low} to {high}"
@@ -109,9 +107,7 @@ def _report(found: FamilyMap, scales: Scales | None) -> Iterator[str]:
     for number, (curve, flows) in enumerate(zip(found.neutral, found.neutral_flows, strict=True), 1):
         yield f"neutral curve {number}, {len(flows)} points, error of ln(k h) at most {curve.error.max():.0e}"
         yield f"it begins at {curve.ends[0]}, and ends at {curve.ends[1]}"
-        header = [
-            [*start, *cells] for start, cells in zip((["k h"], ["[1]"]), tables.heading(_ALONG, scales), strict=False)
-        ]
+        header = tables.heading(_ALONG, scales, before=(("k h", "1"),))
         yield tables.table([*header, *_rows(curve.z[:, 0].tolist(), flows, scales)])
         yield ""
 

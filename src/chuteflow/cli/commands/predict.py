@@ -10,12 +10,13 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.errors import InputError
-from chuteflow.parameters import BY_KEY
+from chuteflow.parameters import BY_KEY, CONDITIONS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from chuteflow.fitting.prediction import Prediction
+    from chuteflow.steady.quantities import Scales
 
 _EPILOG = (
     "Parameters given by an option are taken as known; all others are those of the fit, with their uncertainty.\n\n"
@@ -35,10 +36,11 @@ _COLUMNS = (
 @click.argument("fitted", metavar="FIT")
 @options.option("--slope", type=options.Number(), help="Slope tan(theta); that of the fit by default.")
 @options.option("--angle", type=options.Number(), help="Inclination theta in degrees.")
-@options.option("--e", type=options.Number(), help="Another restitution of two grains.")
-@options.option("--ew", type=options.Number(), help="Another restitution of a grain and the base.")
+@options.option("--e", type=options.Number(), help="Another coefficient of restitution of two grains.")
+@options.option("--ew", type=options.Number(), help="Another coefficient of restitution of a grain and the base.")
 @options.option("--roughness", type=options.Number(), help="Another roughness of the base.")
 @options.condition_options
+@options.grains_options
 @options.option("--confidence", type=options.Number(), help="Confidence of the bands; 0.95 by default.")
 @options.output_options((".csv", ".json"), "curve and profiles with bands")
 def command(**given: Any) -> None:
@@ -54,17 +56,18 @@ def command(**given: Any) -> None:
     if given["angle"] is not None:
         changes["slope"] = _slope(given["angle"])
     calibration = calibration.varied(**changes)
-    condition = options.condition(given, calibration.chute, None)
+    scales = options.scales({**given, "si": False, "grains": {}})
+    condition = options.condition(given, calibration.chute, scales)
     settings = {} if given["confidence"] is None else {"confidence": given["confidence"]}
     found = predict(calibration, **settings, **condition)
 
     def plotted() -> Figure:
         from chuteflow.plotting.prediction_plot import plot_prediction
 
-        return plot_prediction(found)
+        return plot_prediction(found, scales)
 
-    content = prediction_object(found) if given["as_json"] or str(given["save"]).endswith(".json") else None
-    options.deliver_object(given, content, _report(found), lambda: prediction_rows(found), plotted)
+    content = prediction_object(found, scales) if given["as_json"] or str(given["save"]).endswith(".json") else None
+    options.deliver_object(given, content, _report(found, scales), lambda: prediction_rows(found, scales), plotted)
 
 
 def _slope(degrees: float) -> float:
@@ -75,25 +78,35 @@ def _slope(degrees: float) -> float:
     return math.tan(math.radians(number("angle", degrees, 1e-6, 89.9999)))
 
 
-def _report(found: Prediction) -> Iterator[str]:
+def _report(found: Prediction, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import tables, words
-    from chuteflow.steady.quantities import NUMBERS
+    from chuteflow.io.contract import factor
 
-    yield words.chute(found.calibration.chute)
+    chute = found.calibration.chute
+    yield words.chute(chute)
+    if scales is not None:
+        yield words.scales(scales)
     yield f"uncertain: {', '.join(found.calibration.keys) or 'nothing'}; +- is {found.widths:.3g} standard errors"
     yield ""
     if found.flows:
-        rows = [["", "Q", *(cell for name in _COLUMNS for cell in (NUMBERS[name].symbol, "+-"))]]
+        rows = [
+            ["", first, *(cell for name in others for cell in (name, beside))]
+            for beside, (first, *others) in zip(
+                ("+-", ""), tables.heading(("mass_flux", *_COLUMNS), scales), strict=False
+            )
+        ]
         for i, one in enumerate(found.flows, 1):
-            cells = [tables.number(one.flow.mass_flux)]
+            cells = [tables.number(one.flow.mass_flux * factor("mass_flux", chute, scales))]
             for name in _COLUMNS:
-                value, error = one.numbers[name]
+                value, error = (factor(name, chute, scales) * number for number in one.numbers[name])
                 cells += [tables.number(value), f"{found.widths * error:.2g}"]
             rows.append([str(i), *cells])
         yield tables.table(rows)
     else:
-        yield f"no flow: {found.flow_set.reason}"
+        yield words.in_own_units(f"no flow: {found.flow_set.reason}", scales)
     yield ""
     for fold in found.folds:
-        yield f"{fold.kind}: {fold.turns} = {tables.number(fold.value)} +- {fold.value * found.widths * fold.error:.2g}"
+        name = CONDITIONS[fold.turns].quantity
+        value, unit = fold.value * factor(name, chute, scales), words.unit_after(name, scales)
+        yield f"{fold.kind}: {fold.turns} = {tables.number(value)} +- {value * found.widths * fold.error:.2g}{unit}"
     yield from found.warnings

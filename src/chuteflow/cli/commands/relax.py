@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +15,7 @@ from chuteflow.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from chuteflow.io.dataset import Dataset
     from chuteflow.stability.relaxation import Outcome, RelaxationState
     from chuteflow.steady.flow import Flow
     from chuteflow.steady.quantities import Scales
@@ -42,7 +42,7 @@ _EPILOG = (
 @click.command("relax", help=COMMANDS["relax"], epilog=_EPILOG)
 @options.chute_options
 @options.condition_options
-@options.option("--flow", "which", type=click.INT, help="Which of the flows found, 1 for the hottest (the default).")
+@options.flow_option
 @options.option(
     "--heat", type=options.Number(), help="Factor on the granular temperature; 1.1 by default, or 1 with --push."
 )
@@ -51,7 +51,6 @@ _EPILOG = (
 @options.output_options(_SAVED)
 def command(**given: Any) -> None:
     """Solve, disturb, follow and tell."""
-    from chuteflow.branches.enumeration import flows
     from chuteflow.stability.disturbed import DURATION, LONGEST, relax
 
     options.require_outputs(given, _SAVED)
@@ -62,11 +61,9 @@ def command(**given: Any) -> None:
     if not 0.0 < duration <= LONGEST:
         raise InputError(f"--duration {duration:g}: must be above 0 and at most {LONGEST:g}")
     condition: dict[str, Any] = options.condition(given, chute, scales)
-    found = flows(chute, **condition)
-    if not len(found):
-        options.deliver_without_flow(given, found, condition, scales, {"flows": []})
+    flow = options.solve_one(given, chute, condition, scales, {"flows": []})
+    if flow is None:
         return
-    flow = options.chosen(found, given["which"])
     with Progress(seconds=1.0) as progress:
         followed = relax(
             flow,
@@ -76,26 +73,33 @@ def command(**given: Any) -> None:
             progress=lambda time: progress.show(f"t = {time:.6g} of {duration:.6g}"),
         )
     moments, end = followed.moments, followed.outcome
-    content = _content(flow, moments, end, scales)
+    from chuteflow.io.datasets import dataset
+
+    table = dataset(followed, scales)
+
+    def plotted() -> Figure:
+        from chuteflow.plotting.relaxation_plot import plot_relaxation
+
+        return plot_relaxation(flow, moments, end, scales=scales)
+
     options.deliver_object(
         given,
-        content,
+        _content(flow, table, end, scales),
         _told(flow, moments, end, scales),
-        partial(_rows, content),
-        partial(_plotted, flow, moments, end, scales),
+        lambda: table.rows(_COLUMNS),
+        plotted,
     )
 
 
-def _content(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> dict[str, Any]:
+def _content(flow: Flow, table: Dataset, end: Outcome, scales: Scales | None) -> dict[str, Any]:
     from chuteflow.io.contract import chute_object, factor, flow_object, units_object
     from chuteflow.steady.quantities import NUMBERS
 
-    by = {name: factor(name, flow.chute, scales) for name in (*_COLUMNS.values(), "growth")}
-    rate = by["growth"]
+    rate = factor("growth", flow.chute, scales)
     return {
         "chute": chute_object(flow.chute),
         "from": flow_object(flow, scales),
-        **{symbol: [by[name] * getattr(moment, name) for moment in moments] for symbol, name in _COLUMNS.items()},
+        **{symbol: table.lists(name) for symbol, name in _COLUMNS.items()},
         "steady": [flow_object(candidate, scales) for candidate in end.steady],
         "nearest": end.nearest,
         "distance": end.distance if end.nearest is not None else None,
@@ -116,9 +120,7 @@ def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: 
     by = {name: factor(name, flow.chute, scales) for name in _COLUMNS.values()}
     rows = [[number(by[name] * getattr(moments[i], name)) for name in by] for i in sorted(wanted)]
     units = [] if scales is None else [[f"[{SCALED[name].unit}]" for name in by]]
-    yield words.chute(flow.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(flow.chute, scales)
     yield ""
     yield table([list(_COLUMNS), *units, *rows])
     yield ""
@@ -155,14 +157,3 @@ def _verdict(flow: Flow, last: RelaxationState, end: Outcome, scales: Scales | N
     if end.distance < _ARRIVED and end.rate < 0.0:
         return f"it comes to {name}: {away} at t = {ended}, and {rate}"
     return f"not settled at t = {ended}: the nearest is {name}, {away}, and {rate}; give a longer --duration"
-
-
-def _rows(content: dict[str, Any]) -> list[list[str]]:
-    columns = (content[symbol] for symbol in _COLUMNS)
-    return [list(_COLUMNS), *(list(map(repr, row)) for row in zip(*columns, strict=True))]
-
-
-def _plotted(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Figure:
-    from chuteflow.plotting.relaxation_plot import plot_relaxation
-
-    return plot_relaxation(flow, moments, end, scales=scales)

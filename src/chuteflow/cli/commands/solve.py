@@ -53,39 +53,33 @@ def command(**given: Any) -> None:
 
     found = flows(chute, **condition, **options.search(given, chute.slope, scales))
     near, lines = ({}, []) if len(found) else options.nearest(given, chute, condition, scales)
-    if given["as_json"]:
-        from chuteflow.io import contract
-
-        answer = contract.text(contract.flow_set_object(found, scales) | near)
-    else:
-        answer = "\n".join(_report(found, lines, scales))
-
-    def save(path: str) -> None:
-        from chuteflow.io import files
-
-        files.save(found, path, scales=scales)
+    from chuteflow.io.contract import flow_set_object
 
     def plotted() -> Figure:
         from chuteflow.plotting.plots import plot_flows
 
         return plot_flows(found, scales=scales)
 
-    options.deliver(given, answer, save, plotted)
+    options.deliver(
+        given,
+        lambda: flow_set_object(found, scales) | near,
+        _report(found, lines, scales),
+        options.saver(found, scales),
+        plotted,
+    )
 
 
 def _report(found: FlowSet, near: Sequence[str], scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
 
-    yield words.chute(found.chute)
-    if scales is not None:
-        yield words.scales(scales)
+    yield from words.introduction(found.chute, scales)
     if found.flows:
         columns = [n for n in _COLUMNS if n != "interface_height" or found.chute.surface == "interface"]
         ends = [[f"{flow.error:.0e}", flow.validity.summary] for flow in found]
         yield ""
-        yield _table(found, columns, [["error", "validity"], ["[1]", ""]], ends, scales)
+        yield _table(found, columns, (("error", "1"), ("validity", "")), ends, scales)
         yield ""
-        yield _table(found, _SPEEDS, [[], []], [[] for _ in found], scales)
+        yield _table(found, _SPEEDS, (), [[] for _ in found], scales)
         yield ""
         for i, flow in enumerate(found, 1):
             yield f"{i}  {words.among(flow, found)}: {words.kinds(flow)}"
@@ -93,25 +87,20 @@ def _report(found: FlowSet, near: Sequence[str], scales: Scales | None) -> Itera
         yield from words.notes(found)
         largest = max(flow.error for flow in found)
         yield f"error: estimated relative error of Q, h and M, at most {largest:.0e}"
-    else:
-        yield words.in_own_units(f"no flow: {found.reason}", scales)
-        yield from near
-    if found.incomplete:
-        yield words.in_own_units(f"there may be more: {found.incomplete}", scales)
-    yield words.searched(found.searched, found.chute, scales)
+    yield from words.search_outcome(found, scales, near)
 
 
 def _table(
     found: FlowSet,
     columns: Sequence[str],
-    heads: Sequence[list[str]],
+    after: Sequence[tuple[str, str]],
     ends: Sequence[list[str]],
     scales: Scales | None,
 ) -> str:
-    """Numbers of the flows, one in a row, with other cells under ``heads`` at their ends."""
+    """Numbers of the flows, one in a row, with other cells under ``after`` at their ends."""
     from chuteflow.io import tables
 
-    header = [["", *cells, *head] for cells, head in zip(tables.heading(columns, scales), heads, strict=False)]
+    header = tables.heading(columns, scales, before=(("", ""),), after=after)
     rows = [
         [str(i), *tables.numbers(flow, columns, found.chute, scales), *end]
         for i, (flow, end) in enumerate(zip(found, ends, strict=True), 1)

@@ -37,10 +37,7 @@ _EPILOG = (
 _SAVED = (".csv", ".json")
 _MOST = 20
 #: Symbols of the columns of modes, and their units.
-_HEADING = (
-    ("mode", "kx", "ky", "growth", "speed", "error"),
-    ("", "[1/m]", "[1/m]", "[1/s]", "[m/s]", "[1/s]"),
-)
+_HEADING = (("mode", ""), ("kx", "1/m"), ("ky", "1/m"), ("growth", "1/s"), ("speed", "m/s"), ("error", "1/s"))
 _STATES = {True: "stable", False: "unstable", None: "?"}
 
 
@@ -57,7 +54,7 @@ _STATES = {True: "stable", False: "unstable", None: "?"}
 @options.search_options
 @options.option("--budget", metavar="FILE", help="Draw the energy budgets of the modes into FILE: .png, .pdf or .svg.")
 @options.output_options(_SAVED, "the modes")
-def command(as_json: bool, **given: Any) -> None:
+def command(**given: Any) -> None:
     """Solve, search, print, save and draw."""
     chute = options.chute(given)
     scales = options.scales(given)
@@ -80,12 +77,7 @@ def command(as_json: bool, **given: Any) -> None:
     found = flows(chute, **condition, **search)
     near, lines = ({}, []) if len(found) else options.nearest(given, chute, condition, scales)
     answers = [_answer(flow, kx, ky, count) for flow in found]
-    if as_json:
-        from chuteflow.io import contract, stability_records
-
-        answer = contract.text(stability_records.answers_object(found, answers, scales=scales) | near)
-    else:
-        answer = "\n".join(_report(found, answers, lines, scales))
+    from chuteflow.io.stability_records import answers_object
 
     def plotted() -> Figure:
         from chuteflow.plotting.stability_plot import plot_modes
@@ -97,7 +89,14 @@ def command(as_json: bool, **given: Any) -> None:
 
         return plot_budgets(found, answers, scales=scales)
 
-    options.deliver(given, answer, partial(_save, found, answers, scales), plotted, budget=drawn)
+    options.deliver(
+        given,
+        lambda: answers_object(found, answers, scales=scales) | near,
+        _report(found, answers, lines, scales),
+        partial(_save, found, answers, scales),
+        plotted,
+        budget=drawn,
+    )
 
 
 def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> StabilityAnswer:
@@ -132,15 +131,10 @@ def _report(
 ) -> Iterator[str]:
     from chuteflow.io import contract, tables, words
 
-    yield words.chute(found.chute)
-    if scales is not None:
-        yield words.scales(scales)
-    if not answers:
-        yield words.in_own_units(f"no flow: {found.reason}", scales)
-        yield from near
-    else:
+    yield from words.introduction(found.chute, scales)
+    if answers:
         columns = [*contract.PLACE]
-        head = [["", *cells, "", *rest] for cells, rest in zip(tables.heading(columns, scales), _HEADING, strict=False)]
+        head = tables.heading(columns, scales, before=(("", ""),), after=(("", ""), *_HEADING))
         rows = [row for i, answer in enumerate(answers, 1) for row in _rows(str(i), answer, columns, scales)]
         yield ""
         yield tables.table([*head, *rows], words=(5, 6))
@@ -149,7 +143,7 @@ def _report(
             yield f"{i}  {words.among(answer.flow, found)}: {_said(answer, scales)}"
             if answer.budget is not None:
                 yield f"   {_fed(answer.budget, _DisturbanceFormat(found.chute, scales))}"
-    yield words.searched(found.searched, found.chute, scales)
+    yield from words.search_outcome(found, scales, near)
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
-// Questions to the server, or to what the page has with it.
-import { answered, kept } from "./kept.js";
+// Questions to the server, or to the data within a page that has no server.
+import { answered, standalone } from "./standalone.js";
 
-// How often a question is asked again that the server has no room for, and after how many milliseconds.
+// How often a question is asked again that the server is too busy for, and after how many milliseconds.
 const attempts = 10, pause = 300;
-// Milliseconds after which it is said that an answer takes long.
-const patience = 400;
+// Milliseconds after which the page says that it computes.
+const slowAfter = 400;
 
-/** The answer to a question, with its status if that is not 200; `signal` takes it back, which the server notices. */
+/** The answer to a question, with its status if that is not 200; `signal` cancels it, which the server notices. */
 export async function ask(question, query, signal) {
-  if (kept) return answered(question, query);
+  if (standalone) return answered(question, query);
   for (let attempt = 1; ; attempt++) {
     let answer, status;
     try {
@@ -26,10 +26,20 @@ export async function ask(question, query, signal) {
   }
 }
 
-/** What can be set, cases and quantities. */
-export const askAbout = async () => kept?.about ?? (await fetch("about")).json();
+/** The answer to a file that is sent. */
+export async function send(where, query, file) {
+  try {
+    const response = await fetch(`${where}?${new URLSearchParams(query)}`, { method: "POST", body: file, headers: { "x-status": "in-answer" } });
+    return await response.json();
+  } catch {
+    return { error: "the server does not answer: is chuteflow explore still running?" };
+  }
+}
 
-/** One question of a kind is under way at a time; of those that come meanwhile, only the last is asked. */
+/** What can be set, cases and quantities. */
+export const askAbout = async () => standalone?.about ?? (await fetch("about")).json();
+
+/** One question of a kind is pending at a time; of those that arrive meanwhile, only the last is asked. */
 export class Latest {
   /** `waits` (whether) is told when an answer takes long, and when it is there; `answered` takes the answer. */
   constructor(question, waits, answered) {
@@ -50,7 +60,7 @@ export class Latest {
     while (this.next) {
       const { query, mark } = this.next;
       this.next = null;
-      const late = setTimeout(() => this.waits(true), patience), answer = await ask(this.question, query);
+      const late = setTimeout(() => this.waits(true), slowAfter), answer = await ask(this.question, query);
       clearTimeout(late);
       this.waits(false);
       this.answered(answer, query, mark);
@@ -59,8 +69,8 @@ export class Latest {
   }
 }
 
-/** Work for when the sliders rest: `start` (signal) is called a while after the last `begin`, which ends earlier work. */
-export class AtRest {
+/** Work that waits until the sliders rest: `start` (signal) is called `rest` milliseconds after the last `begin`, which cancels earlier work. */
+export class Debounced {
   constructor(rest, start) {
     this.rest = rest;
     this.start = start;

@@ -1,4 +1,4 @@
-// Charts as SVG: axes, areas, lines that may fold back, marks. Everything is redrawn at each change; it is small.
+// Charts as SVG: axes, areas, lines, marks. Everything is redrawn at each change.
 import { escaped, sizeOf } from "./page.js";
 
 /** A number with so many digits, without needless zeros. */
@@ -10,9 +10,9 @@ export function number(value, digits = 4) {
   return String(Number(value.toPrecision(digits)));
 }
 
-function logTicks(low, high, room) {
+function logTicks(low, high, most) {
   const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
-  const step = Math.max(1, Math.ceil((last - first + 1) / room));
+  const step = Math.max(1, Math.ceil((last - first + 1) / most));
   const decades = [];
   for (let k = first; k <= last; k += step) decades.push(10 ** k);
   if (decades.length > 2) return decades;
@@ -22,20 +22,20 @@ function logTicks(low, high, room) {
     if (v >= low * 0.999 && v <= high * 1.001) parts.push(v);
   }
   if (parts.length < 2) return null;
-  return parts.length > room ? parts.filter((_, i) => i % Math.ceil(parts.length / room) === 0) : parts;
+  return parts.length > most ? parts.filter((_, i) => i % Math.ceil(parts.length / most) === 0) : parts;
 }
 
-/** The axis as it is, or one that can be drawn in place of one without an extent. */
-function sound(axis) {
+/** The axis, or a default in place of one that has no extent. */
+function drawable(axis) {
   const { low, high, log } = axis;
   const possible = Number.isFinite(low) && Number.isFinite(high) && high - low > 1e-9 * Math.abs(high) && !(log && low <= 0);
   return possible ? axis : { ...axis, low: 1, high: 10 };
 }
 
-function ticks({ low, high, log }, room) {
-  const logarithmic = log && logTicks(low, high, room);
+function ticks({ low, high, log }, most) {
+  const logarithmic = log && logTicks(low, high, most);
   if (logarithmic) return logarithmic;
-  const raw = (high - low) / room, unit = 10 ** Math.floor(Math.log10(raw));
+  const raw = (high - low) / most, unit = 10 ** Math.floor(Math.log10(raw));
   const step = unit * [1, 2, 5, 10].find((m) => m * unit >= raw);
   const out = [];
   for (let v = Math.ceil(low / step - 1e-9) * step; v <= high + 1e-9 * step; v += step) out.push(Math.abs(v) < 1e-9 * step ? 0 : v);
@@ -60,18 +60,18 @@ function path(points, sx, sy) {
   return placed.map(([a, b], i) => `${i ? "L" : "M"}${a.toFixed(1)} ${b.toFixed(1)}`).join("");
 }
 
-/** A label as markup of SVG: what follows "_" is set lower. */
-const lowered = (label) => escaped(label).replace(/_(\w+)(.*)/, '<tspan dy="3" font-size="9">$1</tspan><tspan dy="-3">$2</tspan>');
+/** A label as SVG markup: what follows "_" is a subscript. */
+const subscripted = (label) => escaped(label).replace(/_(\w+)(.*)/, '<tspan dy="3" font-size="9">$1</tspan><tspan dy="-3">$2</tspan>');
 
-/** Marks as the beginning of an element, whose title and end follow. */
+/** Markers, as the beginning of an element whose title and end follow. */
 const shapes = {
   circle: (x, y) => `<circle class="special" cx="${x}" cy="${y}" r="4.5">`,
   diamond: (x, y) => `<path class="special" d="M${x} ${y - 5.5}l5.5 5.5l-5.5 5.5l-5.5-5.5z">`,
   triangle: (x, y) => `<path class="special" d="M${x - 5} ${y - 4}h10l-5 9z">`,
   bar: (x, y) => `<path class="limit" d="M${x} ${y - 7}v14">`,
-  unstable: (x, y) => `<path class="verdict unstable" d="M${x - 4} ${y - 4}l8 8m-8 0l8-8">`,
-  stable: (x, y) => `<path class="verdict stable" d="M${x - 4} ${y - 4}h8v8h-8z">`,
-  unknown: (x, y) => `<text class="verdict unknown" x="${x}" y="${y + 4}" text-anchor="middle">?`,
+  unstable: (x, y) => `<path class="stability-mark unstable" d="M${x - 4} ${y - 4}l8 8m-8 0l8-8">`,
+  stable: (x, y) => `<path class="stability-mark stable" d="M${x - 4} ${y - 4}h8v8h-8z">`,
+  unknown: (x, y) => `<text class="stability-mark unknown" x="${x}" y="${y + 4}" text-anchor="middle">?`,
   pin: (x, y, { letter }) => `<g class="pin"><path d="M${x - 5} ${y - 5}h10v10h-10z"/><text x="${x - 8}" y="${y - 7}">${letter}</text>`,
   dot: (x, y, mark) => `<circle class="dot" data-flow="${mark.flow}" cx="${x}" cy="${y}" r="${mark.chosen ? 8 : 6}" fill="${mark.colour}">`,
 };
@@ -95,19 +95,19 @@ function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
     if (!y.bare) out.push(`<text x="${l - 5}" y="${Number(p) + 4}" text-anchor="end">${number(v, 3)}</text>`);
   }
   out.push(`<path class="axis" d="M${l} ${t}V${b}H${r}"/>`);
-  out.push(`<text x="${(l + r) / 2}" y="${height - 5}" text-anchor="middle">${lowered(x.label)}</text>`);
-  if (y.label) out.push(`<text transform="translate(12 ${(t + b) / 2}) rotate(-90)" text-anchor="middle">${lowered(y.label)}</text>`);
+  out.push(`<text x="${(l + r) / 2}" y="${height - 5}" text-anchor="middle">${subscripted(x.label)}</text>`);
+  if (y.label) out.push(`<text transform="translate(12 ${(t + b) / 2}) rotate(-90)" text-anchor="middle">${subscripted(y.label)}</text>`);
   return out.join("");
 }
 
 /**
- * Draw into `svg`, without what has no place; returns the scales `sx`, `sy` and the frame `box`.
+ * Draw into `svg`, without what cannot be placed; returns the scales `sx`, `sy` and the frame `box`.
  *
  * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}, hatched without a
  * colour. `points`: {x, y, across, up (errors), shape, colour, title}, beneath all lines. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
 export function draw(svg, { x: across, y: up, areas = [], points: measured = [], lines = [], marks = [], hair }) {
-  const x = sound(across), y = sound(up);
+  const x = drawable(across), y = drawable(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
   // Room for the numbers, of some 6.6 pixels a digit, and for what they are of.

@@ -1,6 +1,6 @@
-// Sliders, number fields and lists: what one sets.
+// Sliders, number fields and lists.
 import { number } from "./chart.js";
-import { byId, escaped, tell } from "./page.js";
+import { byId, escaped, showMessage } from "./page.js";
 import { state } from "./state.js";
 import { factor, unit } from "./units.js";
 
@@ -32,10 +32,10 @@ export function makeControls(about, setter) {
   takeTyped("d", "diameter of the grains", (typed) => (typed > 0 ? { d: typed } : null), "a number above 0");
   takeTyped("rho", "density of the grains", (typed) => (typed > 0 ? { rho: typed } : null), "a number above 0");
   for (const name of ["theme", "against"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.value }, event));
-  for (const name of ["si", "whole", "judge"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
+  for (const name of ["si", "whole", "stability"]) byId(name).addEventListener("change", (event) => set({ [name]: event.target.checked ? "1" : "" }, event));
 }
 
-/** Cases to choose from, in groups; which of them the controls show is seen from their numbers. */
+/** Cases to choose from, in groups; the list shows the one whose values the controls have. */
 function makeCases({ presets, cases }) {
   const groups = [["Views of the paper", presets], ["Chutes and materials", cases]];
   for (const [label, those] of groups) {
@@ -56,7 +56,7 @@ function makeCases({ presets, cases }) {
   });
 }
 
-/** The case that was chosen last, if it still holds, or the first that holds: all that it says is so. */
+/** The case that was chosen last if the state still has its values, or the first of which it has. */
 function showCase() {
   const holds = (one) => Object.entries(one.state).every(([name, value]) => state[name] === String(value));
   const found = latest && holds(latest) ? latest : offered.find(holds);
@@ -64,7 +64,7 @@ function showCase() {
   byId("case-words").textContent = found?.words ?? "";
 }
 
-/** On a phone the sliders fold away; elsewhere there is room for them. */
+/** On a phone the sliders fold away; elsewhere they fit. */
 function foldWhereSmall() {
   const small = matchMedia("(max-width: 700px)"), fold = () => { byId("fold").open = !small.matches; };
   small.addEventListener("change", fold);
@@ -90,7 +90,7 @@ function takeTyped(id, what, parts, wanted) {
     if (taken) { set(taken, event); showControls(); return; }
     const given = event.target.validity.badInput ? "what was typed is no number" : text === "" ? "nothing was typed" : `${text} was typed`;
     showControls();
-    tell("typed", `The ${what} must be ${wanted}: ${given}, and ${event.target.value} stays.`);
+    showMessage("typed", `The ${what} must be ${wanted}: ${given}, and ${event.target.value} stays.`);
   });
 }
 
@@ -120,7 +120,7 @@ const fieldText = (value) => (Number.isFinite(value) ? String(Number(value.toPre
 
 /** Show the state in every control; what was said of typed text is over. */
 export function showControls() {
-  tell("typed", "");
+  showMessage("typed", "");
   for (const [name, control] of Object.entries(controls)) {
     const value = Number(state[name]), shown = value * factorOf(name), field = byId(name), slider = byId(`${name}-slider`);
     const units = name === "Q" ? unit("Q") : "";
@@ -135,7 +135,7 @@ export function showControls() {
   if (controls.slope) byId("angle").value = fieldText(degrees(Number(state.slope)));
   for (const name of ["d", "rho"]) byId(name).value = fieldText(Number(state[name]));
   for (const name of [...Object.keys(choices), "theme", "against"]) byId(name).value = state[name];
-  for (const name of ["si", "whole", "judge"]) byId(name).checked = Boolean(state[name]);
+  for (const name of ["si", "whole", "stability"]) byId(name).checked = Boolean(state[name]);
   byId("grains").hidden = !state.si;
   showCase();
 }

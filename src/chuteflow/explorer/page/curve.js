@@ -1,7 +1,7 @@
-// The curve of all flows, folds and all: flows at the flux as points to choose, and the curve itself to drag.
+// The curve of all flows: the flows at the flux are points to choose, and the curve itself can be dragged.
 import { draw, number } from "./chart.js";
 import { flux, fluxWithin } from "./controls.js";
-import { kept } from "./kept.js";
+import { standalone } from "./standalone.js";
 import { byId, colour, flowColour, sentence } from "./page.js";
 import { curvePoints } from "./measured.js";
 import { pinned } from "./pins.js";
@@ -10,25 +10,25 @@ import { change, state } from "./state.js";
 import { factor, labelled, unit } from "./units.js";
 
 const svg = byId("curve");
-/** What the curve is drawn against; the surface temperature is one thing on the half-line and another beneath an interface. */
+/** The quantity on the vertical axis; the surface temperature is that far above, or that at an interface. */
 const nameOf = (quantity) => ({
   h: "centre of mass h", M: "hold-up M",
   T_surface: state.surface === "interface" ? "T_surface, at the interface" : "T_surface, far above",
 })[quantity];
 const shapes = { "fold-Q": "circle", "fold-M": "circle", "fold-T": "circle", "density-inversion": "diamond", "interior-change": "triangle" };
-// Flows of each branch that are judged, as far as they are in the frame.
-const judgedOfBranch = 9;
+// Number of flows of each branch within the frame whose stability is examined.
+const examinedPerBranch = 9;
 let curve = null, flows = null, chosen = 0, shown = null, frame = null, set = null, limits = {};
 // What is known about the stability of flows of the curve, by branch and place on it.
-let verdicts = new Map();
-// Which limits of the theory the flows of each branch pass, or null where that is not known.
+let results = new Map();
+// The limits of the theory that the flows of each branch exceed, or null where not known.
 let passed = null;
-// While the curve is dragged: ln of the quantity where the pointer is.
+// While the curve is dragged: ln of the quantity at the pointer.
 let held = null;
-// How far from the curve the pointer still reads it, in pixels.
+// Largest distance from the curve at which the pointer reads it, in pixels.
 const near = 30;
 
-// A small curve stays in view beside the sliders where the curve itself is out of it.
+// A small copy of the curve is shown beside the sliders where the curve itself is out of view.
 const mini = byId("mini");
 let away = false;
 new IntersectionObserver((entries) => {
@@ -47,7 +47,7 @@ export function begin(setter, validity) {
 export function takeCurve(answer) {
   curve = answer.error ? { branches: [], says: "", why: answer.error } : answer;
   byId("count").textContent = curve.says;
-  verdicts = new Map();
+  results = new Map();
   passed = null;
   redraw();
 }
@@ -82,7 +82,7 @@ function wanted() {
   return { x, y: { low: Math.min(...ys) * 0.9, high: Math.max(...ys) * 1.1, log: true }, name, whole: state.whole };
 }
 
-/** The frame stays as long as it serves, so that the curve moves and not the axes. */
+/** The axes stay as long as they contain the curve, so that the curve moves and not the axes. */
 function settle() {
   const next = wanted();
   if (!next) { frame = null; return; }
@@ -103,7 +103,7 @@ function* stretches(branch, kind) {
   }
 }
 
-/** Lines of a branch: by the kind of density, over a band where the flows are beyond the theory. */
+/** Lines of a branch: by the kind of density, over a band where the flows are outside the limits of the theory. */
 function linesOf(branch, at) {
   const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(wordsAt(branch, i)?.length);
   const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true }));
@@ -118,7 +118,7 @@ const words = (branch, i) => (passed ? wordsAt(branch, i).join(", ") || "within 
 /** What the shades mean: the words of the stretches that are drawn. */
 function tellLimits() {
   const seen = new Set(curve.branches.flatMap((b, k) => (passed?.[k] ?? []).filter((_, i) => inFrame(b, i)).flat()));
-  byId("beyond").textContent = seen.size ? `Shaded: beyond what the theory takes for granted, which changes at a bar: ${[...seen].map((word) => `${word} (${limits[word]})`).join("; ")}.` : "";
+  byId("beyond").textContent = seen.size ? `Shaded: outside the assumptions of the theory; they change at a bar: ${[...seen].map((word) => `${word} (${limits[word]})`).join("; ")}.` : "";
 }
 
 const inFrame = (branch, i) => ["x", "y"].every((axis) => {
@@ -126,37 +126,37 @@ const inFrame = (branch, i) => ["x", "y"].every((axis) => {
   return value >= frame[axis].low && value <= frame[axis].high;
 });
 
-/** Flows of the curve that are to be judged and are not yet: evenly along each branch in the frame, the middle first. */
-export function unjudged() {
-  if (!frame || !state.judge) return [];
+/** Flows of the curve whose stability is still to be examined: evenly along each branch in the frame, the middle first. */
+export function notExamined() {
+  if (!frame || !state.stability) return [];
   const wanted = curve.branches.flatMap((branch, b) => {
-    const inside = branch.Q.map((_, i) => i).filter((i) => inFrame(branch, i)), count = Math.min(judgedOfBranch, inside.length);
+    const inside = branch.Q.map((_, i) => i).filter((i) => inFrame(branch, i)), count = Math.min(examinedPerBranch, inside.length);
     const chosen = Array.from({ length: count }, (_, k) => inside[Math.round(((k + 0.5) / count) * inside.length - 0.5)]);
     return chosen.map((point, k) => ({ branch: b, point, turn: (k * 4) % count }));
   });
-  return wanted.filter(({ branch, point }) => !verdicts.has(`${branch}:${point}`)).sort((a, b) => a.turn - b.turn);
+  return wanted.filter(({ branch, point }) => !results.has(`${branch}:${point}`)).sort((a, b) => a.turn - b.turn);
 }
 
-/** What is known about a flow of the curve; `more` are still to come. */
-export function judge({ branch, point }, verdict) {
-  verdicts.set(`${branch}:${point}`, { branch, point, ...verdict });
+/** Store the stability of a flow of the curve. */
+export function addStability({ branch, point }, known) {
+  results.set(`${branch}:${point}`, { branch, point, ...known });
   redraw();
 }
 
-/** Marks of the flows that were judged, and in words how many, and against which waves. */
-function judged(at) {
-  const all = state.judge ? [...verdicts.values()].filter(({ branch, point }) => inFrame(curve.branches[branch], point)) : [];
-  byId("judged").textContent = sayJudged(all);
+/** Markers of the flows whose stability was examined; the text below counts them and names the waves. */
+function stabilityMarks(at) {
+  const all = state.stability ? [...results.values()].filter(({ branch, point }) => inFrame(curve.branches[branch], point)) : [];
+  byId("stability-words").textContent = stabilitySentence(all);
   return all.map(({ branch, point, state: shape, says }) => ({ ...at(curve.branches[branch], point), shape, title: says }));
 }
 
-function sayJudged(all) {
-  if (kept) return "";
-  if (!state.judge) return "Stability along the curve is not looked at.";
-  const count = (kind) => all.filter((one) => one.state === kind).length, left = unjudged().length;
+function stabilitySentence(all) {
+  if (standalone) return "";
+  if (!state.stability) return "Stability along the curve is not examined.";
+  const count = (kind) => all.filter((one) => one.state === kind).length, left = notExamined().length;
   const counts = `× unstable (${count("unstable")}), ■ stable (${count("stable")}), ? not known (${count("unknown")})`;
   const searched = all.map((one) => one.searched).filter(Boolean), s = factor("h"), units = unit("h") || "d";
-  const waves = searched.length ? ` Each was held against at least the waves of ${number(Math.max(...searched.map(([low]) => low)) * s, 2)} to ${number(Math.min(...searched.map(([, high]) => high)) * s, 2)} ${units}.` : "";
+  const waves = searched.length ? ` Each was examined for waves of at least ${number(Math.max(...searched.map(([low]) => low)) * s, 2)} to ${number(Math.min(...searched.map(([, high]) => high)) * s, 2)} ${units}.` : "";
   const why = all.length && !searched.length ? ` ${sentence(all[0].reason ?? all[0].says)}` : "";
   return `Stability of ${all.length} ${all.length === 1 ? "flow" : "flows"} of the curve${left ? `, ${left} to come` : ""}: ${counts}. Between them nothing is known.${waves}${why}`;
 }
@@ -166,7 +166,7 @@ export function redraw() {
   settle();
   if (!frame) {
     svg.innerHTML = "";
-    byId("judged").textContent = "";
+    byId("stability-words").textContent = "";
     byId("beyond").textContent = "";
     byId("curve-words").textContent = curve.why ? sentence(curve.why) : "No curve: this chute has no flows in the range searched.";
     shown = null;
@@ -186,7 +186,7 @@ export function redraw() {
     for (const s of branch.special) marks.push({ x: s.Q * sq, y: s[name] * sn, shape: shapes[s.kind] ?? "circle", title: curve.kinds[s.kind] ?? s.kind });
     for (const i of changes(branch)) marks.push({ ...at(branch, i), shape: "bar", title: words(branch, i) });
   }
-  marks.push(...judged(at));
+  marks.push(...stabilityMarks(at));
   (flows ?? []).forEach((flow, i) => marks.push({ x: flow.Q * sq, y: flow[name] * sn, shape: "dot", flow: i, colour: flowColour(i), chosen: i === chosen, title: flow.name }));
   const x = axis(frame.x, sq, labelled("mass flux Q", "Q")), y = axis(frame.y, sn, labelled(nameOf(name), name));
   shown = draw(svg, { x, y, points: curvePoints(name), lines, marks, hair: flux() * sq });

@@ -1,9 +1,9 @@
-// A drawing of the chosen flow: grains placed by the volume fraction, carried by the velocity, shaken by the temperature.
+// A drawing of the chosen flow: grains follow the volume fraction, the velocity and the granular temperature.
 import { byId, colour, download, sizeOf } from "./page.js";
 
 const canvas = byId("chute"), key = byId("chute-key"), pause = byId("pause");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
-// Grains: at the least so that one sees a flow, at the most so that they can move; their radii in pixels.
+// Smallest and largest number of grains, and of their radii in pixels.
 const fewest = 25, most = 1500, smallest = 1.5, largest = 12;
 let view = null, grains = [], running = !still.matches, last = 0;
 
@@ -15,8 +15,8 @@ function at(field, z, height) {
   return field[low] * (1 - w) + field[high] * w;
 }
 
-/** The i-th grain: its share of the mass below, and its place along the chute, both evenly spread. */
-const placed = (i) => ({ share: (0.5 + i * 0.7548776662466927) % 1, x: (0.5 + i * 0.5698402909980532) % 1, dx: 0, dz: 0 });
+/** The i-th grain: its fraction of the mass below, and its place along the chute, both evenly spread. */
+const placed = (i) => ({ fraction: (0.5 + i * 0.7548776662466927) % 1, x: (0.5 + i * 0.5698402909980532) % 1, dx: 0, dz: 0 });
 
 /** Show a flow, or none, on its slope. */
 export function show(flow, slope, ink) {
@@ -25,38 +25,38 @@ export function show(flow, slope, ink) {
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   if (!flow) {
     view = null;
-    key.textContent = "No flow, no grains.";
+    key.textContent = "There is no flow to draw.";
     paint(0);
     return;
   }
   const { z, nu, T, u } = flow.profile, angle = Math.atan(slope), top = Math.min(2.5 * flow.h, z.at(-1));
-  // Room for the chute's fall across the picture, and for the flow above it.
+  // Height for the chute's fall across the picture, and for the flow above it.
   const fall = Math.min(box.width * slope, 0.5 * box.height), pixel = Math.max(8, box.height - fall - 24) / top;
   const radius = Math.min(largest, Math.max(smallest, pixel / 2)), length = (box.width / Math.cos(angle) + 2 * radius) / pixel + top * slope;
   const mass = [0], inside = z.filter((height) => height <= top * 1.000001);
   for (let i = 1; i < inside.length; i++) mass.push(mass[i - 1] + ((nu[i] + nu[i - 1]) / 2) * (z[i] - z[i - 1]));
-  // So many discs that the share of the picture which they cover is the volume fraction, whatever their size.
+  // The number of discs whose area is the volume fraction of the picture, whatever their size.
   const exact = (mass.at(-1) * length * pixel ** 2) / (Math.PI * radius ** 2), count = Math.round(Math.min(most, Math.max(fewest, exact)));
   view = { slope, angle, top, pixel, radius, length, ratio, ink, width: box.width, height: box.height, start: box.height - 10 - fall };
-  view.pace = (0.25 * length) / Math.max(...u.slice(0, inside.length), 1e-9);
+  view.speedScale = (0.25 * length) / Math.max(...u.slice(0, inside.length), 1e-9);
   while (grains.length > count) grains.pop();
   while (grains.length < count) grains.push(placed(grains.length));
   for (const grain of grains) {
-    grain.z = at(inside, mass, grain.share * mass.at(-1));
+    grain.z = at(inside, mass, grain.fraction * mass.at(-1));
     grain.u = at(u, z, grain.z);
     grain.root = Math.sqrt(Math.max(0, at(T, z, grain.z)));
   }
   const size = pixel / 2 < smallest ? "grains drawn larger than they are" : pixel / 2 > largest ? "grains drawn smaller than they are" : "grains to scale";
-  const number = count === Math.round(exact) ? "" : count < exact ? ", fewer than should be" : ", more than should be";
-  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${number}. They cover as much as the volume fraction says, move by the velocity and jitter by the temperature.`;
+  const number = count === Math.round(exact) ? "" : count < exact ? ", fewer than in the flow" : ", more than in the flow";
+  key.textContent = `A drawing of the computed fields, not a simulation: ${size}${number}. The grains cover the volume fraction, move with the velocity and fluctuate with the granular temperature.`;
   paint(0);
 }
 
 const normal = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 
-/** Carry each grain for `dt` seconds, and shake it about its place. */
+/** Move each grain for `dt` seconds, with fluctuations about its place. */
 function move(dt) {
-  const step = dt * view.pace, keep = Math.exp(-4 * dt), spread = Math.min(1.5, 0.15 * view.top), kick = 0.6 * Math.sqrt(step);
+  const step = dt * view.speedScale, keep = Math.exp(-4 * dt), spread = Math.min(1.5, 0.15 * view.top), kick = 0.6 * Math.sqrt(step);
   for (const grain of grains) {
     grain.x = (grain.x + (grain.u * step) / view.length) % 1;
     const shaken = (d) => Math.min(spread, Math.max(-spread, keep * d + kick * grain.root * normal()));
@@ -67,8 +67,8 @@ function move(dt) {
 
 /** Where grains are drawn, in pixels along the chute and above it. */
 function* places() {
-  const { length, pixel, radius, top, slope } = view, lean = top * slope;
-  for (const grain of grains) yield [(grain.x * length - lean + grain.dx) * pixel - radius, Math.abs(grain.z + grain.dz) * pixel + radius];
+  const { length, pixel, radius, top, slope } = view, shift = top * slope;
+  for (const grain of grains) yield [(grain.x * length - shift + grain.dx) * pixel - radius, Math.abs(grain.z + grain.dz) * pixel + radius];
 }
 
 /** Grains of the base, half sunk. */
@@ -134,7 +134,7 @@ function run(on) {
 }
 
 pause.addEventListener("click", () => run(!running));
-// Who asks for less motion gets a still picture, and may start it.
+// Where the system asks for reduced motion, the picture is still until it is started.
 still.addEventListener("change", () => run(!still.matches));
 run(running);
 if (running) requestAnimationFrame(frame);

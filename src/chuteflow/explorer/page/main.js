@@ -1,12 +1,12 @@
 // The page: the state changes, questions are asked, and the panels are redrawn when answers come.
-import { ask, askAbout, AtRest, Latest } from "./ask.js";
+import { ask, askAbout, Debounced, Latest } from "./ask.js";
 import { number } from "./chart.js";
 import { makeControls, showControls } from "./controls.js";
 import * as curve from "./curve.js";
 import * as chutePicture from "./grains.js";
-import { kept } from "./kept.js";
+import { standalone } from "./standalone.js";
 import * as map from "./map.js";
-import { byId, escaped, flowColour, forgetColours, sentence, tell } from "./page.js";
+import { byId, download, escaped, flowColour, forgetColours, sentence, showMessage } from "./page.js";
 import * as measurements from "./measured.js";
 import * as pins from "./pins.js";
 import { drawBudget, drawProfiles } from "./profiles.js";
@@ -17,7 +17,7 @@ import { factor, setQuantities, unit } from "./units.js";
 
 const about = await askAbout();
 setQuantities(about.quantities);
-start(about.presets[0].state, about.fixed);
+start({ ...about.presets[0].state, ...about.first }, about.fixed);
 byId("version").textContent = about.version;
 
 let flows = null, mark = 0;
@@ -34,11 +34,11 @@ function set(parts, event) {
 
 // --- answers ----------------------------------------------------------------------------------------------------
 
-/** Whether a panel waits for an answer, said after a while. */
+/** Whether a panel waits for an answer, shown after a while. */
 const waits = (panel) => (waiting) => byId(panel).setAttribute("aria-busy", String(waiting));
 
-/** Where the curve passes limits of the theory takes longer than the curve itself: it is asked when the sliders rest. */
-const limits = new AtRest(150, async (signal) => {
+/** The limits of the theory take longer to compute than the curve itself: they are asked for when the sliders rest. */
+const limits = new Debounced(150, async (signal) => {
   const answer = await ask("limits", chute(), signal);
   signal.throwIfAborted();
   if (!answer.error) curve.takeLimits(answer.words);
@@ -61,13 +61,13 @@ const asks = {
 
 const refused = {};
 
-/** Use an answer, or say what went wrong and that the panels are not of what the controls say. */
+/** Use an answer, or say what went wrong and that the panels belong to previous values. */
 function take(answer, name, since, use) {
-  // What is left out is said in its panel, which shows then nothing that is of before.
+  // A part that is left out is named in its panel, which then shows nothing of previous values.
   const leftOut = answer.status === 422;
   refused[name] = Boolean(answer.error) && !leftOut;
-  tell(name, refused[name] ? `${answer.error.replace(/\.$/, "")}.${flows ? " What is shown below is of before." : ""}` : "");
-  document.querySelector("main").classList.toggle("of-before", Object.values(refused).includes(true));
+  showMessage(name, refused[name] ? `${answer.error.replace(/\.$/, "")}.${flows ? " What is shown below belongs to the previous values." : ""}` : "");
+  document.querySelector("main").classList.toggle("outdated", Object.values(refused).includes(true));
   if (refused[name]) return;
   use();
   measured(name, since);
@@ -100,12 +100,12 @@ onChange((has) => {
   if (ofChute(has) || has("Q") || words) askFlows();
   if (ofChute(has) || words) askCurve();
   showControls();
-  if (has("Q", "against", "whole", "judge")) curve.redraw();
-  if (has("against", "whole", "judge")) stability.again();
+  if (has("Q", "against", "whole", "stability")) curve.redraw();
+  if (has("against", "whole", "stability")) stability.again();
   if (has("pin")) pins.load();
   if (has("story")) story.show();
   if (has("flow") || ofLooks(has)) showFlows();
-  if (!kept) map.changed(has);
+  if (!standalone) map.changed(has);
 });
 
 // --- flows --------------------------------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ function showFlows() {
   pins.show();
   drawProfiles(list, flows.top, k, pins.pinned());
   curve.takeFlows(list, k);
-  // The rest comes a frame later, so that flows and profiles follow the slider as closely as they can.
+  // The rest is drawn a frame later, so that flows and profiles follow the slider without delay.
   requestAnimationFrame(() => setTimeout(showRest));
 }
 
@@ -144,7 +144,7 @@ function showRest() {
 
 byId("flows").addEventListener("change", (event) => set({ flow: event.target.value }, event));
 
-// --- what can be taken along ------------------------------------------------------------------------------------
+// --- exports -----------------------------------------------------------------------------------------------------
 
 /** A link to what the server makes of the state at the time of the click. */
 function exported(link, what, format) {
@@ -180,6 +180,22 @@ whole.className = "served";
 whole.innerHTML = 'This chute at every flux, as one page that needs no server: <a href="#" download data-export="page-html">HTML</a>';
 exported(whole.querySelector("a"), "page", "html");
 byId("exports").append(whole);
+whole.querySelector("a").addEventListener("click", async (event) => {
+  const data = measurements.shown();
+  if (!data.length) return;
+  // The server does not know what was loaded here: it is put into the page that the server makes.
+  event.preventDefault();
+  showMessage("export", "");
+  const page = await (await fetch(event.target.href)).text();
+  const place = /(<script type="application\/json" id="standalone-data">)([^<]*)(<\/script>)/;
+  if (!place.test(page)) { showMessage("export", "The page that needs no server is left out: ask again, or use chuteflow explore --export."); return; }
+  const filled = page.replace(place, (_, begin, content, end) => {
+    const parts = JSON.parse(content);
+    parts.about.data = data;
+    return begin + JSON.stringify(parts).replaceAll("<", "\\u003c") + end;
+  });
+  download("chuteflow.html", new Blob([filled], { type: "text/html" }));
+});
 
 for (const what of ["address", "command", "python"]) byId(`copy-${what}`).addEventListener("click", async () => {
   write();
@@ -200,7 +216,7 @@ onSteps(showSteps);
 addEventListener("keydown", (event) => {
   const key = event.key.toLowerCase(), step = key === "y" || event.shiftKey ? redo : undo;
   if (!(event.ctrlKey || event.metaKey) || event.altKey || (key !== "z" && key !== "y")) return;
-  // What is being typed has an undo of its own.
+  // A number that is being typed has its own undo.
   const { dataset, value } = event.target;
   if (dataset.shown !== undefined && dataset.shown !== value) return;
   event.preventDefault();
@@ -223,19 +239,19 @@ pins.begin(set, () => {
   curve.redraw();
 }, chosen);
 story.begin(set);
-if (kept) tellKept(kept.says);
+if (standalone) showStandaloneWords(standalone.says);
 else map.begin(about, set);
-/** What a page that needs no server is of: below the flux, or at the end where there is no room. */
-function tellKept(says) {
+/** The contents of a page that needs no server: below the flux, or at the end of a small page. */
+function showStandaloneWords(says) {
   const words = document.createElement("section");
-  words.id = "kept-words";
-  words.innerHTML = `<h2>What this page is of</h2>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
+  words.id = "standalone-words";
+  words.innerHTML = `<h2>About this page</h2>${says.map((text) => `<p>${escaped(sentence(text))}</p>`).join("")}`;
   (innerWidth > 700 ? byId("sliders") : document.querySelector("main")).append(words);
 }
 function redraw() {
   forgetColours();
   showFlows();
-  if (!kept) map.redraw();
+  if (!standalone) map.redraw();
 }
 new ResizeObserver(redraw).observe(document.querySelector("main"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);

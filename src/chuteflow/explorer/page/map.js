@@ -1,5 +1,5 @@
-// The map: which chutes carry flows, over two of the four parameters, with this chute as a cross-hair to drag.
-import { ask, AtRest } from "./ask.js";
+// The map: the flows of chutes over two of the four parameters, with this chute as a cross-hair to drag.
+import { ask, Debounced } from "./ask.js";
 import { draw, number } from "./chart.js";
 import { byId, colour, sentence } from "./page.js";
 import * as readout from "./readout.js";
@@ -7,26 +7,26 @@ import { chute, state } from "./state.js";
 
 const svg = byId("map"), key = byId("map-key"), selects = { x: byId("map-x"), y: byId("map-y") };
 const names = ["slope", "e", "ew", "roughness"];
-// From this on, numbers are not told apart.
+// Numbers from this on are shown alike.
 const many = 6;
 const capped = (count) => Math.min(count, many), countName = (count) => (count === many ? `${many} or more` : count);
-// What a chute is shaded by: its words, which of its values are told apart, and how they are called.
+// Shadings: label, title, values that are distinguished, and their names.
 const shadings = {
   most: { label: "flows at one flux", says: "At most this many flows share one flux", value: capped, name: countName },
-  families: { label: "families", says: "Families of flows that do not connect", value: capped, name: countName },
+  families: { label: "branches", says: "Solution branches that do not connect", value: capped, name: countName },
   density: { label: "density", says: "Densities among the flows", value: (bits) => bits, name: (bits) => ["no flow", "monotonic", "inverted", "both"][bits] },
   interior: { label: "interior", says: "Interiors among the flows", value: (bits) => bits, name: (bits) => ["dissipative", "mixed", "productive"].filter((_, i) => bits & (1 << i)).join(" + ") || "no flow" },
 };
 // Columns to begin with, and how narrow the stretches between columns may become, or those beside an unknown one.
 const first = 8, finest = 64, finestUnknown = 16, evenly = Array.from({ length: first + 1 }, (_, i) => i / first);
-// What is not known of a column has a value of its own, which is hatched.
+// The value of what is unknown, which is hatched.
 const unknown = -1;
-// Places near which a column is looked at closely, at most.
+// Largest number of values near which a column is classified on a finer grid.
 const mostNear = 32;
 let about = null, set = null, failure = "", shown = null, holding = false;
-// What is asked for: all but the cross-hair. Its columns in order, and whether they are all that are needed.
+// The question: all but the cross-hair. Its columns in order, and whether all that are needed are there.
 let wanted = {}, columns = [], whole = false, drawn = null;
-// Whether the columns are coarse ones, of while the sliders move, and whether the map is in view.
+// Whether the columns are coarse ones, a preview while the sliders move, and whether the map is in view.
 let rough = false, seen = true;
 // Parts of a stretch between two columns that are drawn straight.
 const bends = 6;
@@ -98,7 +98,7 @@ const roughly = {
   },
 };
 
-const asking = new AtRest(150, async (signal) => {
+const asking = new Debounced(150, async (signal) => {
   const query = question();
   const known = !rough && JSON.stringify(query) === JSON.stringify(wanted) ? columns : [];
   let places = known.length ? narrower(known) : evenly;
@@ -141,7 +141,7 @@ function withoutAnswer({ x, y }, place) {
   return { outer, inner, at: low + place * (high - low), parts: null };
 }
 
-/** Where the columns to either side of a place change: there a new one is looked at closely. */
+/** Values at which the neighbouring columns change: there a new one is classified on a finer grid. */
 function near(found, place) {
   const left = found.findLast((column) => column.place < place), right = found.find((column) => column.place > place);
   const stops = [left, right].flatMap((column) => Object.values(column?.parts ?? {}).flatMap((part) => part.stops));
@@ -158,7 +158,7 @@ function shaded({ parts }) {
 
 const alike = (a, b) => String(a.values) === String(b.values);
 
-/** How well two stops correspond, given how far apart they are as a share of the column: better the more of the values to their sides agree. */
+/** How well two boundaries correspond, given how far apart they are as a fraction of the column: better the more of the values to their sides agree. */
 function likeness(a, i, b, j, apart) {
   const agree = Number(a.values[i] === b.values[j]) + Number(a.values[i + 1] === b.values[j + 1]);
   return [0.2 - 4 * apart, 0.6 - 3 * apart, 1 - 0.9 * apart][agree];
@@ -175,7 +175,7 @@ function corresponding(a, b, span) {
 }
 
 /**
- * How steep each boundary is at each column: such that curves through all columns do not swing (Fritsch and Carlson).
+ * Slopes of each boundary at each column, so that the cubics through all columns are monotonic (Fritsch and Carlson).
  * `pairs` are the stops that correspond, of each two neighbours.
  */
 function slopes(seen, pairs) {
@@ -188,7 +188,7 @@ function slopes(seen, pairs) {
   }));
 }
 
-/** A boundary from one column to the next, at a share `w` of the way. */
+/** A boundary from one column to the next, at a fraction `w` of the way. */
 function along(w, from, to, steep0, steep1, width) {
   const v = 1 - w;
   return v * v * (1 + 2 * w) * from + w * w * (3 - 2 * w) * to + w * v * v * width * steep0 - w * w * v * width * steep1;
@@ -307,7 +307,7 @@ export function redraw() {
   svg.classList.toggle("waiting", !current || !whole);
   svg.insertAdjacentHTML("beforeend", `<path id="map-hair" class="hair"/><circle id="map-here" class="special" r="4.5"><title>this chute</title></circle>`);
   const legend = told.map((value) => `<svg viewBox="0 0 2 2" aria-hidden="true"><rect width="2" height="2" fill="${shade(value)}"/></svg>${name(value)}`);
-  key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, it takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
+  key.innerHTML = current ? `${says}: ${legend.join(" ")}${told.length < values.length ? "; hatched: not known, the computation takes too long" : ""}.${drawn.lines.length ? " Line: on one side of it there are flows at every high temperature." : ""} Drag the cross-hair to another chute.` : "";
   placeHair();
   readAgain();
   key.append(failure || (current && whole ? "" : rough ? " Coarse, until the sliders rest." : ` Drawing: ${current ? columns.length : 0} columns so far.`));

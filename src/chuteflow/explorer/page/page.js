@@ -4,16 +4,16 @@ export const byId = (id) => document.getElementById(id);
 
 export const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
-/** A sentence of what the server says: it begins large and ends with a full stop. */
+/** The text as a sentence: with a capital letter and a full stop. */
 export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1).replace(/\.$/, "")}.`;
 
-// What the server says comes before what is said of typed text, which then has changed nothing.
-const told = { flows: "", curve: "", typed: "" };
+// Messages of the server are shown before those on typed text.
+const messages = { flows: "", curve: "", export: "", typed: "" };
 
-/** Say on the one line for it what is wrong, by where that comes from, or with an empty text that it no longer is. */
-export function tell(from, text) {
-  told[from] = text;
-  const first = Object.values(told).find(Boolean) ?? "", line = byId("failure");
+/** Show a message of what is wrong, by its source; an empty text removes it. */
+export function showMessage(from, text) {
+  messages[from] = text;
+  const first = Object.values(messages).find(Boolean) ?? "", line = byId("failure");
   line.hidden = !first;
   if (line.textContent !== first) line.textContent = first;
 }
@@ -23,7 +23,7 @@ const watcher = new ResizeObserver((entries) => {
   for (const { target, contentRect } of entries) sizes.set(target, contentRect);
 });
 
-/** Width and height of an element. Asking the browser after each change would make it lay out the page anew. */
+/** Width and height of an element. Asking the browser after each change would make it lay out the page again. */
 export function sizeOf(element) {
   if (!sizes.has(element)) {
     sizes.set(element, element.getBoundingClientRect());
@@ -43,7 +43,7 @@ export function colour(name) {
 /** The colour of a flow, by its place among the flows. */
 export const flowColour = (i) => colour(`--flow${i % 5}`);
 
-/** Colours are looked up anew: the theme has changed. */
+/** Colours are read again: the theme has changed. */
 export function forgetColours() { seen = {}; }
 
 /** Hand a file to the browser's downloads. */

@@ -1,7 +1,7 @@
 // Flows that are pinned stay drawn beside those at the flux, whatever the controls say; the address holds them too.
 import { ask } from "./ask.js";
 import { number } from "./chart.js";
-import { kept } from "./kept.js";
+import { standalone } from "./standalone.js";
 import { byId, colour, escaped } from "./page.js";
 import { chute, material, state } from "./state.js";
 import { factor, unit } from "./units.js";
@@ -48,10 +48,10 @@ export async function load() {
     if (answers.has(key)) continue;
     const pin = read(key);
     answers.set(key, {});
-    const flows = kept && !same(pin.chute, chute()) ? { error: "this page is of another chute" } : await ask("flows", { ...pin.chute, Q: pin.Q });
+    const flows = standalone && !same(pin.chute, chute()) ? { error: "this page is of another chute" } : await ask("flows", { ...pin.chute, Q: pin.Q });
     answers.set(key, { flow: flows.flows?.[Number(pin.place)], error: flows.error ?? "there is no such flow" });
     changed();
-    if (kept || flows.error) continue;
+    if (standalone || flows.error) continue;
     const curve = await ask("curve", pin.chute);
     if (!curve.error) answers.get(key).curve = curve;
     changed();
@@ -68,13 +68,13 @@ export function show() {
   const all = keys().map((key, i) => ({ ...read(key), ...answers.get(key), i }));
   byId("pinned").hidden = !all.length;
   byId("pin").textContent = all.length < most ? "Pin the chosen flow" : "Pin the chosen flow in the place of the oldest";
-  const told = Object.keys(parameters).filter((name) => all.some((pin) => pin.chute[name] !== String(state[name])));
+  const differing = Object.keys(parameters).filter((name) => all.some((pin) => pin.chute[name] !== String(state[name])));
   const row = ({ key, chute: of, flow, error, i }) => {
     const letter = "abcde"[i], value = (symbol) => (flow ? number(flow[symbol] * factor(symbol, of.slope)) : "–"), what = flow ? flow.name : error ? `left out: ${error}` : "computing…";
     const buttons = [["show", "show"], ["remove", "remove"]].map(([does, text]) => `<button type="button" data-does="${does}" data-key="${escaped(key)}" aria-label="${text} ${letter}">${text}</button>`);
     return `<tr><th scope="row">${letter} <svg class="dash" viewBox="0 0 34 6" aria-hidden="true"><path d="M0 3H34" stroke="${colour("--pin")}" stroke-width="2" stroke-dasharray="${dashes[i]}"/></svg></th>
-      ${told.map((name) => `<td>${escaped(of[name])}</td>`).join("")}${numbers.map((symbol) => `<td>${value(symbol)}</td>`).join("")}<td class="words">${escaped(what)}</td><td>${buttons.join(" ")}</td></tr>`;
+      ${differing.map((name) => `<td>${escaped(of[name])}</td>`).join("")}${numbers.map((symbol) => `<td>${value(symbol)}</td>`).join("")}<td class="words">${escaped(what)}</td><td>${buttons.join(" ")}</td></tr>`;
   };
-  const lowered = (text) => text.replace(/_(\w+)/, "<sub>$1</sub>"), units = (symbol) => (unit(symbol) ? ` (${unit(symbol)})` : "");
-  byId("pinned").innerHTML = all.length ? `<table><caption>Pinned flows</caption><thead><tr><th scope="col">pin</th>${told.map((name) => `<th scope="col">${lowered(parameters[name])}</th>`).join("")}${numbers.map((symbol) => `<th scope="col">${lowered(symbol)}${units(symbol)}</th>`).join("")}<th scope="col" class="words">flow</th><td></td></tr></thead><tbody>${all.map(row).join("")}</tbody></table>` : "";
+  const subscripted = (text) => text.replace(/_(\w+)/, "<sub>$1</sub>"), units = (symbol) => (unit(symbol) ? ` (${unit(symbol)})` : "");
+  byId("pinned").innerHTML = all.length ? `<table><caption>Pinned flows</caption><thead><tr><th scope="col">pin</th>${differing.map((name) => `<th scope="col">${subscripted(parameters[name])}</th>`).join("")}${numbers.map((symbol) => `<th scope="col">${subscripted(symbol)}${units(symbol)}</th>`).join("")}<th scope="col" class="words">flow</th><td></td></tr></thead><tbody>${all.map(row).join("")}</tbody></table>` : "";
 }

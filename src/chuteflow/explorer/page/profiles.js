@@ -6,12 +6,12 @@ import * as readout from "./readout.js";
 import { factor, labelled, unit } from "./units.js";
 
 const panels = [["nu", "volume fraction", "ν"], ["T", "granular temperature", "T"], ["u", "velocity", "u"]];
-// Narrower panels than this have no room for words, nor for numbers beside all but the first.
+// Panels narrower than this have a symbol as label, and numbers at the first panel only.
 const narrow = 210;
 const dashes = ["", "7 4", "2 3"];
 // Charts over height by their id: how they were drawn, the lines that can be read, and up to which height.
 const charts = new Map();
-// The height that is read in all charts, or null; the arrow keys move it by this share of the chart.
+// The height that is read in all charts, or null; the arrow keys move it by this fraction of the chart.
 let height = null;
 const step = 1 / 40;
 
@@ -102,10 +102,10 @@ export function drawProfiles(list, height, chosen, pins) {
 
 export function drawBudget(flow, i) {
   drawRates(flow, i);
-  drawShares(flow, i);
+  drawBudgetBars(flow, i);
 }
 
-/** Work, conduction and dissipation at each height; they add up to nothing in a steady flow. */
+/** Work, conduction and dissipation at each height; their sum is zero in a steady flow. */
 function drawRates(flow, i) {
   const svg = byId("budget");
   charts.delete(svg.id);
@@ -131,15 +131,15 @@ function drawRates(flow, i) {
 }
 
 /** The same for the whole flow, with what happens at the base. */
-function drawShares(flow, i) {
-  const svg = byId("shares");
+function drawBudgetBars(flow, i) {
+  const svg = byId("budget-bars");
   if (!flow) { svg.innerHTML = ""; byId("budget-words").textContent = ""; return; }
   const b = flow.budget, above = Math.max(0, -b.heat_through_surface), total = b.slip_work + b.shear_work + above;
   const rows = [
     ["gained", [["slip on the base", b.slip_work, 1], ["shear inside", b.shear_work, 0.6], ["free grains above", above, 0.3]]],
     ["lost", [["hitting the base", b.base_loss, 1], ["among the grains", b.dissipation, 0.6]]],
   ];
-  const width = sizeOf(svg).width - 60, share = (v) => `${Math.round((100 * v) / total)} %`;
+  const width = sizeOf(svg).width - 60, percent = (v) => `${Math.round((100 * v) / total)} %`;
   svg.innerHTML = rows.map(([name, parts], r) => {
     let x = 58;
     const bars = parts.map(([, v, opacity]) => {
@@ -149,7 +149,7 @@ function drawShares(flow, i) {
     });
     return `<text x="50" y="${16 + 22 * r}" text-anchor="end">${name}</text>${bars.join("")}`;
   }).join("");
-  const said = rows.map(([name, parts]) => `${name}: ${parts.filter((part) => part[1] > 0).map(([what, v]) => `${what} ${share(v)}`).join(", ")}`);
+  const said = rows.map(([name, parts]) => `${name}: ${parts.filter((part) => part[1] > 0).map(([what, v]) => `${what} ${percent(v)}`).join(", ")}`);
   const base = b.heat_from_base > 0 ? "The base heats the flow" : "The base cools the flow";
   byId("budget-words").textContent = `In the whole flow, ${said.join("; ")}. ${base}.`;
   svg.setAttribute("aria-label", byId("budget-words").textContent);

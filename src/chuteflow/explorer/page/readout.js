@@ -16,13 +16,13 @@ export function place(svg, { box }, { x, y, dots = [], says }) {
   svg.insertAdjacentHTML("beforeend", `<g class="cross"><path d="${across}${up}"/>${points.join("")}<g class="tip"><rect rx="3"/><text>${lines.join("")}</text></g></g>`);
   const tip = svg.querySelector(".tip"), { width, height } = tip.querySelector("text").getBBox(), frame = tip.querySelector("rect");
   for (const [name, value] of Object.entries({ x: -5, y: -14, width: width + 10, height: height + 7 })) frame.setAttribute(name, value);
-  // Beside the place that is read, on the side with room, and within the chart.
-  const room = sizeOf(svg), px = x ?? box.r, py = y ?? box.t;
-  const left = px + 12 + width < room.width ? px + 14 : px - 14 - width, top = py - 10 - height < 4 ? py + 24 : py - height + 4;
-  tip.setAttribute("transform", `translate(${Math.max(6, Math.min(room.width - width - 6, left)).toFixed(1)} ${Math.max(15, Math.min(room.height - height, top)).toFixed(1)})`);
+  // Beside the place that is read, on the side with space, and within the chart.
+  const tipFrame = sizeOf(svg), px = x ?? box.r, py = y ?? box.t;
+  const left = px + 12 + width < tipFrame.width ? px + 14 : px - 14 - width, top = py - 10 - height < 4 ? py + 24 : py - height + 4;
+  tip.setAttribute("transform", `translate(${Math.max(6, Math.min(tipFrame.width - width - 6, left)).toFixed(1)} ${Math.max(15, Math.min(tipFrame.height - height, top)).toFixed(1)})`);
 }
 
-/** Let a screen reader say what the arrow keys have come to. */
+/** Let a screen reader say the values at the cross-hair. */
 export function speak(text) { byId("spoken").textContent = text; }
 
 /**

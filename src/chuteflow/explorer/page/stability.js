@@ -1,57 +1,57 @@
-// Whether flows are stable: asked one after another when the sliders rest, those at the flux before those of the curve,
-// and shown as answers come.
-import { ask, AtRest } from "./ask.js";
+// Whether flows are stable: asked one after another when the sliders rest, those at the flux before those of the
+// curve, and shown as answers arrive.
+import { ask, Debounced } from "./ask.js";
 import * as curve from "./curve.js";
-import { kept } from "./kept.js";
+import { standalone } from "./standalone.js";
 import { byId, escaped } from "./page.js";
 import { chute, grains, state } from "./state.js";
 
-let verdicts = [], count = 0, looking = false;
+let results = [], count = 0, searching = false;
 
-const asking = new AtRest(400, async (signal) => {
+const asking = new Debounced(400, async (signal) => {
   const query = { ...chute(), ...grains() }, chosen = Math.min(Number(state.flow) || 0, count - 1);
-  const verdict = async (which) => {
+  const result = async (which) => {
     const answer = await ask("stability", { ...query, ...which }, signal);
     signal.throwIfAborted();
     return answer.error ? { state: "unknown", says: `not known whether it is stable: ${answer.error}` } : answer;
   };
   const order = [chosen, ...Array.from({ length: count }, (_, i) => i).filter((i) => i !== chosen)];
-  for (const flow of order.filter((i) => i >= 0 && !verdicts[i])) {
-    verdicts[flow] = await verdict({ Q: state.Q, flow });
+  for (const flow of order.filter((i) => i >= 0 && !results[i])) {
+    results[flow] = await result({ Q: state.Q, flow });
     show();
   }
-  looking = false;
-  for (let [next] = curve.unjudged(); next; [next] = curve.unjudged()) {
-    const known = await verdict({ branch: next.branch, point: next.point });
-    curve.judge(next, known);
-    // Where the question cannot be posed, it cannot for any flow of the curve.
+  searching = false;
+  for (let [next] = curve.notExamined(); next; [next] = curve.notExamined()) {
+    const known = await result({ branch: next.branch, point: next.point });
+    curve.addStability(next, known);
+    // A question that cannot be asked for one flow cannot be asked for any flow of the curve.
     if (known.state === "unknown" && known.reason && !known.searched) break;
   }
 });
 
-/** Other flows are wanted: what is asked about those before is taken back. */
+/** Other flows are wanted: questions about the previous ones are cancelled. */
 export function stop() {
   asking.stop();
-  looking = false;
+  searching = false;
   show();
 }
 
 /** Other flows are there: `number` of them. */
 export function restart(number) {
-  verdicts = [];
+  results = [];
   count = number;
-  looking = count > 0 && !kept;
+  searching = count > 0 && !standalone;
   again();
 }
 
 /** Go on with what is not known yet. */
-export function again() { if (!kept) asking.begin(); }
+export function again() { if (!standalone) asking.begin(); }
 
 /** Put what is known beside the flows. */
 export function show() {
   byId("flows").querySelectorAll(".stability").forEach((place, i) => {
-    const known = verdicts[i];
-    place.innerHTML = known ? `<b>${escaped(known.says)}</b>${known.waves ? ` (${escaped(known.waves)})` : ""}` : looking ? "stability: looking for growing waves…" : "stability not looked at";
+    const known = results[i];
+    place.innerHTML = known ? `<b>${escaped(known.says)}</b>${known.waves ? ` (${escaped(known.waves)})` : ""}` : searching ? "stability: searching for growing waves…" : "stability not examined";
     place.dataset.state = known?.state ?? "";
   });
 }

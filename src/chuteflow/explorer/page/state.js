@@ -3,17 +3,17 @@
 const listeners = [];
 export const material = ["slope", "e", "ew", "roughness", "surface", "closure"];
 const defaults = {
-  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", judge: "1", pin: "", story: "", x: "slope", y: "roughness", shade: "most",
+  si: "", d: "1", rho: "2500", theme: "", flow: "0", against: "h", whole: "", stability: "1", pin: "", story: "", x: "slope", y: "roughness", shade: "most",
 };
-// What can be chosen from few; numbers and names of the chute are checked by the server, which says what is wrong.
+// Values of lists and check boxes; the parameters of the chute are checked by the server.
 const parameters = ["slope", "e", "ew", "roughness"];
 const allowed = {
-  si: ["", "1"], whole: ["", "1"], judge: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
+  si: ["", "1"], whole: ["", "1"], stability: ["", "1"], theme: ["", "light", "dark"], against: ["h", "M", "T_surface"], x: parameters, y: parameters,
   shade: ["most", "families", "density", "interior"],
 };
-// What holds the state back from the address: a finger or button that is down, or changes within the last moments.
+// Milliseconds without a change after which the state is written to the address, unless a button is down.
 const rest = 250;
-let first = {}, unchanged = [], due = null, held = false, written = "", newest = 0, told = () => {};
+let first = {}, unchanged = [], due = null, held = false, written = "", newest = 0, stepsChanged = () => {};
 export const state = {};
 
 /** Take the state of the address, over the defaults and over `preset`, in which the `fixed` names stay. */
@@ -40,11 +40,11 @@ export function change(parts) {
   wait();
 }
 
-/** One step back is one drag, not each of its places: the address is written when all rests. */
+/** A whole drag is one step to undo: the address is written when the pointer rests. */
 function wait() {
   clearTimeout(due);
   due = setTimeout(() => { if (held) wait(); else write(); }, rest);
-  told();
+  stepsChanged();
 }
 
 addEventListener("pointerdown", () => { held = true; }, true);
@@ -54,18 +54,19 @@ addEventListener("popstate", () => {
   clearTimeout(due);
   due = null;
   written = address();
-  told();
+  stepsChanged();
 });
 
 /** `listen` is called after each change with a function that tells whether any of some names changed. */
 export function onChange(listen) { listeners.push(listen); }
 
 export function address() {
-  const shown = Object.entries(state).filter(([name, value]) => defaults[name] !== value);
+  // What the page opens with need not be what others open with.
+  const shown = Object.entries(state).filter(([name, value]) => defaults[name] !== value || first[name] !== value);
   return `${location.pathname}?${new URLSearchParams(shown)}`;
 }
 
-/** Put the state into the address, as a step that can be taken back. */
+/** Put the state into the address, as a step that can be undone. */
 export function write() {
   clearTimeout(due);
   due = null;
@@ -73,22 +74,22 @@ export function write() {
     written = address();
     newest = place() + 1;
     // Browsers allow some hundred steps in half a minute, and none where the page may not know its address.
-    try { history.pushState({ place: newest }, "", address()); } catch { /* then there is nothing to take back */ }
+    try { history.pushState({ place: newest }, "", address()); } catch { /* then there is nothing to undo */ }
   }
-  told();
+  stepsChanged();
 }
 
 const place = () => history.state?.place ?? 0;
 
 /** `listen` is called whenever `canUndo` or `canRedo` may have changed. */
-export function onSteps(listen) { told = listen; }
+export function onSteps(listen) { stepsChanged = listen; }
 export const canUndo = () => due !== null || place() > 0;
 export const canRedo = () => due === null && place() < newest;
 
-/** What waits to be written becomes a step now. */
+/** Write a pending change as a step now. */
 export function settle() { if (due !== null) write(); }
 
-/** Take back the last step. */
+/** Undo the last step. */
 export function undo() {
   settle();
   if (canUndo()) history.back();
@@ -105,5 +106,5 @@ export const grains = () => (state.si ? { diameter: String(Number(state.d) / 100
 /** Whether the chute itself changed. */
 export const ofChute = (has) => has(...material);
 
-/** Whether what is drawn must be drawn anew though no answer changed. */
+/** Whether panels must be drawn again although no answer changed. */
 export const ofLooks = (has) => has("si", "d", "rho", "theme");

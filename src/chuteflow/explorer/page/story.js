@@ -1,4 +1,4 @@
-// The three flows of the paper, told in a few steps; each sets the chute and the flux that it is about.
+// The three flows of the paper, described in a few steps; each sets the chute and the flux that it is about.
 import { byId } from "./page.js";
 import { state } from "./state.js";
 
@@ -35,10 +35,10 @@ function go(step, event) {
 }
 
 export function show() {
-  const step = Number(state.story), told = steps[step - 1];
-  byId("story").hidden = !told;
-  if (!told) return;
-  byId("story-words").textContent = told[1];
+  const step = Number(state.story), current = steps[step - 1];
+  byId("story").hidden = !current;
+  if (!current) return;
+  byId("story-words").textContent = current[1];
   byId("story-place").textContent = `step ${step} of ${steps.length}`;
   byId("story-back").setAttribute("aria-disabled", String(step === 1));
   byId("story-next").setAttribute("aria-disabled", String(step === steps.length));

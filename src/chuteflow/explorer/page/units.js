@@ -9,7 +9,7 @@ export function factor(symbol, slope = state.slope) {
   if (!state.si) return 1;
   const [a, b, c] = quantities[symbol].dimension;
   const value = Number(state.rho) ** a * (Number(state.d) / 1000) ** b * (9.81 / Math.hypot(1, Number(slope))) ** c;
-  // An address may hold grains or a slope that cannot be, which the server then says.
+  // An address may hold impossible grains or slopes, which the server reports.
   return value > 0 && Number.isFinite(value) ? value : 1;
 }
 
