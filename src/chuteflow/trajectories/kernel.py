@@ -177,11 +177,11 @@ def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, sto
 
 
 @compiled_in_place
-def _follow(out: Any, before: Any, i: int, q: int, half: float, rate: float, source: float) -> None:
-    """Entry ``i`` of function ``q``, whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
-    with half a step of ``half``; in balance at the first. ``before`` (7,) is what the next entry needs of this."""
-    out[i, q] = source / rate if i == 0 else (before[q] + half * source) / (1.0 + half * rate)
-    before[q] = out[i, q] + half * (source - rate * out[i, q])
+def _follow(before: float, half: float, rate: float, source: float, begins: bool) -> tuple[float, float]:
+    """The next value of a function whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
+    with half a step of ``half``, or in balance where it begins; and what the value after that needs as ``before``."""
+    value = source / rate if begins else (before + half * source) / (1.0 + half * rate)
+    return value, value + half * (source - rate * value)
 
 
 @compiled
@@ -218,16 +218,22 @@ def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, 
         shearing_slope = per * (values[ahead, SHEARING] - values[after, SHEARING])
         inverse, k = values[i, INVERSE], values[i, COUPLED]
         heating = 0.5 * (k * (1.0 + beta) - beta)
-        _follow(out, before, i, Y_1, half, 2.0 + heating, values[i, NET])
+        out[i, Y_1], before[Y_1] = _follow(before[Y_1], half, 2.0 + heating, values[i, NET], i == 0)
         y = out[i, Y_1]
-        _follow(out, before, i, L_2, half, 2.0, -y * inverse)
+        out[i, L_2], before[L_2] = _follow(before[L_2], half, 2.0, -y * inverse, i == 0)
         moved = out[i, L_2]
         heated = y * inverse * (1.0 - k) + (1.0 + beta) * moved * k_slope
-        _follow(out, before, i, Y_3, half, 4.0 + heating, moved * net_slope - 0.5 * y * heated)
-        _follow(out, before, i, H_1, half, 1.0 - beta, values[i, HEIGHT])
-        _follow(out, before, i, H_3, half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]))
-        _follow(out, before, i, G_1, half, 2.0 - 0.5 * beta, values[i, SHEARING])
-        _follow(out, before, i, G_3, half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]))
+        out[i, Y_3], before[Y_3] = _follow(
+            before[Y_3], half, 4.0 + heating, moved * net_slope - 0.5 * y * heated, i == 0
+        )
+        out[i, H_1], before[H_1] = _follow(before[H_1], half, 1.0 - beta, values[i, HEIGHT], i == 0)
+        out[i, H_3], before[H_3] = _follow(
+            before[H_3], half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]), i == 0
+        )
+        out[i, G_1], before[G_1] = _follow(before[G_1], half, 2.0 - 0.5 * beta, values[i, SHEARING], i == 0)
+        out[i, G_3], before[G_3] = _follow(
+            before[G_3], half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]), i == 0
+        )
         least, most = min(low[i], low[ahead]), max(high[i], high[ahead])
         nearest = 0.0 if least <= 0.0 <= most else min(abs(least), abs(most))
         reached = math.exp((LOW + i / PER_UNIT + log_scale) / (1.0 + beta))
@@ -236,9 +242,8 @@ def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, 
 
 
 @compiled_in_place
-def _between(table: Any, i: int, t: float, column: int) -> float:
-    """One function at the place ``t`` from entry ``i`` to the next."""
-    return table[i, column] + t * (table[i + 1, column] - table[i, column])
+def _between(one: float, other: float, t: float) -> float:
+    return one + t * (other - one)
 
 
 @compiled_in_place
@@ -248,10 +253,10 @@ def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s:
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), len(layer) - 1.000001)
     i = int(at)
     t, square, root = at - i, over * over, math.exp(-0.5 * big_l)
-    out[j, S_L] = big_l + square * (_between(layer, i, t, L_2))
-    y_1, y_3 = _between(layer, i, t, Y_1), _between(layer, i, t, Y_3)
-    h_1, h_3 = _between(layer, i, t, H_1), _between(layer, i, t, H_3)
-    g_1, g_3 = _between(layer, i, t, G_1), _between(layer, i, t, G_3)
+    out[j, S_L] = big_l + square * (_between(layer[i, L_2], layer[i + 1, L_2], t))
+    y_1, y_3 = _between(layer[i, Y_1], layer[i + 1, Y_1], t), _between(layer[i, Y_3], layer[i + 1, Y_3], t)
+    h_1, h_3 = _between(layer[i, H_1], layer[i + 1, H_1], t), _between(layer[i, H_3], layer[i + 1, H_3], t)
+    g_1, g_3 = _between(layer[i, G_1], layer[i + 1, G_1], t), _between(layer[i, G_3], layer[i + 1, G_3], t)
     out[j, S_Y] = over * (y_1 + square * y_3)
     out[j, S_H] = square * root * root * (h_1 + square * h_3)
     out[j, S_G] = slope * square * math.sqrt(over) * root * (g_1 + square * g_3)
