@@ -213,6 +213,9 @@ def test_sensitivities_are_printed_and_saved(flow, tmp_path, capsys):
     assert last["derivatives"]["M"]["slope"] == pytest.approx(flow.sensitivity(["slope"]).numbers["mass_holdup"][0])
     assert last["derivatives"]["H"]["slope"] is None
     assert last["fold"] is None
+    grains = ["--diameter", "1 mm", "--density", "2500"]
+    assert main(["sensitivities", *PAPER, "--flux", "1 kg/m/s", *grains]) == DONE
+    assert "numbers are dimensionless" in capsys.readouterr().out
     table = tmp_path / "s.csv"
     assert main(["sensitivities", *PAPER, "--flux", "3", "--flow", "3", "--fixed", "M", "--save", str(table)]) == DONE
     assert "derivatives at fixed M" in capsys.readouterr().out
