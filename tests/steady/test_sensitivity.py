@@ -66,11 +66,11 @@ def finer(problem, z, parts):
 
 
 @pytest.mark.parametrize(("closure", "holdup", "parts"), [("garzo-dufty", 1.2, 3), ("extended", 2.0, 6)])
-def test_the_sparse_solution_on_many_pieces_is_that_of_the_dense_matrix(closure, holdup, parts):
+def test_the_sparse_solution_on_many_pieces_is_that_of_the_dense_matrix(closure, holdup, parts, monkeypatch):
+    monkeypatch.setattr(linearised, "_DENSE", 0)
     flow = flows(replace(CHUTE, closure=closure), M=holdup)[0]
     problem, z = finer(flow.solution.problem, flow.solution.z, parts)
     state = problem.state(z)
-    assert len(state.g) > linearised._DENSE
     gradient = state.macroscopic_gradient()
     border = np.array([0.1, 0.2, 1.0, 0.3]) @ gradient
     sides = np.zeros((len(z), 2))

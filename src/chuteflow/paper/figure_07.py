@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Profile
-from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.flow_profiles import MASS_FLUX, SLOPE, FlowProfiles, flow_profiles
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -17,9 +14,6 @@ from chuteflow.plotting import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MASS_FLUX = 3.0
-SLOPE = 0.3
-POINTS = 401
 #: The flows from hot to cold, with the right and upper end of their panels.
 FLOWS = {"high temperature": (0.06, 30.0), "mid-temperature": (0.2, 15.0), "low temperature": (0.4, 6.0)}
 LINES = {
@@ -28,49 +22,23 @@ LINES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Figure7:
-    """Flows and profiles by temperature and surface condition."""
-
-    flows: dict[tuple[str, str], SteadyFlow]
-    profiles: dict[tuple[str, str], Profile]
-
-    def table(self) -> FigureTable:
-        """The profiles, one below the other, up to the interface where there is one."""
-        notes = [
-            f"{name}, {surface}: Q = {flow.mass_flux}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}, "
-            f"H = {flow.interface_height}, surface temperature {flow.surface_temperature}"
-            for (name, surface), flow in self.flows.items()
-        ]
-        columns = stacked(
-            "flow",
-            {
-                key: {field: getattr(profile, field) for field in ("height", "volume_fraction")}
-                for key, profile in self.profiles.items()
-            },
-        )
-        keys = columns.pop("flow")
-        named = {"flow": [name for name, _ in keys], "surface": [surface for _, surface in keys]}
-        title = f"Figure 7: volume fraction of the flows with mass flux {MASS_FLUX}, surface conditions compared"
-        chutes = (chute_note(dissipative(SLOPE, surface)) for surface in LINES)
-        return FigureTable(title, (*chutes, *notes), named | columns)
+def compute(source: Source = OVERBURDEN) -> FlowProfiles:
+    """The three flows of each surface condition, up to the interface where there is one."""
+    return flow_profiles(
+        f"Figure 7: volume fraction of the flows with mass flux {MASS_FLUX}, surface conditions compared",
+        {name: top for name, (_, top) in FLOWS.items()},
+        {surface: dissipative(SLOPE, surface) for surface in LINES},
+        source,
+        compared="surface",
+        fields=("volume_fraction",),
+        note=lambda flow: (
+            f"Q = {flow.mass_flux}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}, H = {flow.interface_height}, "
+            f"surface temperature {flow.surface_temperature}"
+        ),
+    )
 
 
-def compute(source: Source = OVERBURDEN) -> Figure7:
-    """The three flows of each surface condition."""
-    found = {
-        (name, surface): flow
-        for surface in LINES
-        for name, flow in zip(FLOWS, source.flows(dissipative(SLOPE, surface), Q=MASS_FLUX), strict=True)
-    }
-    profiles = {
-        (name, surface): flow.profile(np.linspace(0.0, min(flow.interface_height, FLOWS[name][1]), POINTS))
-        for (name, surface), flow in found.items()
-    }
-    return Figure7(found, profiles)
-
-
-def draw(data: Figure7) -> Figure:
+def draw(data: FlowProfiles) -> Figure:
     """One panel for each flow; a dot ends a profile at its interface."""
     figure, axes = style.panels(3, height=2.9)
     for ax, (name, (right, top)) in zip(axes, FLOWS.items(), strict=True):

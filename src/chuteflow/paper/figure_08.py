@@ -5,19 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from chuteflow.paper.curves import Curves, draw_two, trace
+from chuteflow.paper.figure_07 import LINES
+from chuteflow.paper.flow_profiles import SLOPE
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
-from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SLOPE = 0.3
-#: Strokes and words of the two curves.
-LINES = {
-    "free": (style.LineStyle(style.BLUE, style.SOLID), "asymptotic conditions"),
-    "interface": (style.LineStyle(style.VERMILION, style.DASHED), "interface conditions"),
-}
 #: Where the panel ends in Q and h.
 RIGHT, TOP = 6.0, 15.0
 

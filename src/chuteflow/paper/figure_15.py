@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from chuteflow import Profile
-from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.flow_profiles import FIELDS, MASS_FLUX, SLOPE, FlowProfiles, flow_profiles
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -17,10 +12,6 @@ from chuteflow.plotting import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MASS_FLUX = 3.0
-SLOPE = 0.3
-POINTS = 401
-FIELDS = ("volume_fraction", "granular_temperature", "velocity")
 #: The flows from hot to cold: the upper end of their panels, and the lower and upper ends of the fields.
 FLOWS = {
     "high temperature": (30.0, ((0.0, 0.06), (6.0, 10.0), (0.0, 14.0))),
@@ -33,45 +24,19 @@ LINES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Figure15:
-    """Flows and profiles by temperature and closure."""
-
-    flows: dict[tuple[str, str], SteadyFlow]
-    profiles: dict[tuple[str, str], Profile]
-
-    def table(self) -> FigureTable:
-        """The profiles, one below the other."""
-        notes = [
-            f"{name}, {closure}: T_inf = {flow.surface_temperature}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}"
-            for (name, closure), flow in self.flows.items()
-        ]
-        columns = stacked(
-            "flow",
-            {
-                key: {field: getattr(profile, field) for field in ("height", *FIELDS)}
-                for key, profile in self.profiles.items()
-            },
-        )
-        keys = columns.pop("flow")
-        named = {"flow": [name for name, _ in keys], "closure": [closure for _, closure in keys]}
-        title = f"Figure 15: profiles of the flows with mass flux {MASS_FLUX}, forms of the heat flux compared"
-        chutes = (chute_note(dissipative(SLOPE, closure=closure)) for closure in LINES)
-        return FigureTable(title, (*chutes, *notes), named | columns)
-
-
-def compute(source: Source = OVERBURDEN) -> Figure15:
+def compute(source: Source = OVERBURDEN) -> FlowProfiles:
     """The three flows of each closure."""
-    found = {
-        (name, closure): flow
-        for closure in LINES
-        for name, flow in zip(FLOWS, source.flows(dissipative(SLOPE, closure=closure), Q=MASS_FLUX), strict=True)
-    }
-    profiles = {key: flow.profile(np.linspace(0.0, FLOWS[key[0]][0], POINTS)) for key, flow in found.items()}
-    return Figure15(found, profiles)
+    return flow_profiles(
+        f"Figure 15: profiles of the flows with mass flux {MASS_FLUX}, forms of the heat flux compared",
+        {name: top for name, (top, _) in FLOWS.items()},
+        {closure: dissipative(SLOPE, closure=closure) for closure in LINES},
+        source,
+        compared="closure",
+        note=lambda flow: f"T_inf = {flow.surface_temperature}, h = {flow.centre_of_mass}, M = {flow.mass_holdup}",
+    )
 
 
-def draw(data: Figure15) -> Figure:
+def draw(data: FlowProfiles) -> Figure:
     """A row of three panels for each flow, from hot to cold."""
     figure, axes = style.panels(3, 3, height=6.6, shared_y=True)
     for row, (name, (top, ends)) in enumerate(FLOWS.items()):

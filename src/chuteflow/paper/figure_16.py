@@ -6,14 +6,11 @@ first. Far above the two become equal, so that the first dominates where the hea
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chuteflow import Profile
-from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.flow_profiles import MASS_FLUX, SLOPE, FlowProfiles, flow_profiles
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
 from chuteflow.plotting import style
@@ -21,9 +18,6 @@ from chuteflow.plotting import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MASS_FLUX = 3.0
-SLOPE = 0.3
-POINTS = 401
 #: The flows from hot to cold: upper end of their panels.
 FLOWS = {"high temperature": 30.0, "mid-temperature": 15.0, "low temperature": 6.0}
 #: Parts of the upward heat flux, with the signs by which they become the terms of the caption.
@@ -41,33 +35,13 @@ LINES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Figure16:
-    """Flows and profiles by temperature."""
-
-    flows: dict[str, SteadyFlow]
-    profiles: dict[str, Profile]
-
-    def table(self) -> FigureTable:
-        """The upward heat flux and its parts, the conductive one with the other sign than drawn."""
-        columns = stacked(
-            "flow",
-            {
-                name: {field: getattr(profile, field) for field in ("height", *LINES, "heat_flux")}
-                for name, profile in self.profiles.items()
-            },
-        )
-        title = f"Figure 16: upward heat flux and its parts in the flows with mass flux {MASS_FLUX}"
-        return FigureTable(title, (chute_note(dissipative(SLOPE)),), columns)
+def compute(source: Source = OVERBURDEN) -> FlowProfiles:
+    """The three flows, the upward heat flux and its parts, the conductive one with the other sign than drawn."""
+    title = f"Figure 16: upward heat flux and its parts in the flows with mass flux {MASS_FLUX}"
+    return flow_profiles(title, FLOWS, dissipative(SLOPE), source, fields=(*LINES, "heat_flux"))
 
 
-def compute(source: Source = OVERBURDEN) -> Figure16:
-    """The three flows and their profiles."""
-    found = dict(zip(FLOWS, source.flows(dissipative(SLOPE), Q=MASS_FLUX), strict=True))
-    return Figure16(found, {name: flow.profile(np.linspace(0.0, FLOWS[name], POINTS)) for name, flow in found.items()})
-
-
-def draw(data: Figure16) -> Figure:
+def draw(data: FlowProfiles) -> Figure:
     """One panel for each flow, height upwards."""
     figure, axes = style.panels(3, height=2.9)
     for ax, (name, top) in zip(axes, FLOWS.items(), strict=True):

@@ -5,19 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from chuteflow.paper.curves import Curves, draw_two, trace
+from chuteflow.paper.figure_15 import LINES
+from chuteflow.paper.flow_profiles import SLOPE
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, Source
-from chuteflow.plotting import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SLOPE = 0.3
-#: Strokes and words of the two curves.
-LINES = {
-    "lun": (style.LineStyle(style.BLUE, style.SOLID), "modified Fourier"),
-    "lun-fourier": (style.LineStyle(style.VERMILION, style.DOTTED), r"reduced, $g_4 \equiv 0$"),
-}
 #: Where the panel ends in Q and h.
 RIGHT, TOP = 6.0, 15.0
 
