@@ -14,7 +14,7 @@ from chuteflow.cli.commands import COMMANDS
 from chuteflow.cli.program import chuteflow as program
 from chuteflow.cli.program import main
 from chuteflow.io.chute_file import read_chute
-from chuteflow.steady.cases import CASES, GUESSED, MEASURED, case
+from chuteflow.steady.cases import CASES, GUESSED, TYPICAL, case
 
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"
 FILE = """
@@ -125,18 +125,19 @@ def test_a_mistake_is_one_line(run, words, said):
 def test_every_number_of_a_material_says_how_it_is_known():
     for one in CASES.values():
         for key, known in {**one.numbers, **one.grains}.items():
-            if known.how in (MEASURED, GUESSED):
+            if known.how in (TYPICAL, GUESSED):
                 assert known.uncertainty, (one.name, key)
                 assert known.source, (one.name, key)
     assert case("sand").numbers["e"].how == GUESSED
-    assert case("glass-beads").numbers["e"].how == MEASURED
+    assert case("glass-beads").numbers["e"].how == TYPICAL
 
 
 def test_cases_are_listed_and_told(run):
     _, out, _ = run("cases")
     assert all(name in out for name in CASES)
     _, out, _ = run("cases glass-beads")
-    assert "+- 0.01" in out
+    assert "+- 0.02" in out
+    assert "not checked against it" in out
     _, out, _ = run("cases --json")
     assert [one["name"] for one in json.loads(out)["cases"]] == [*CASES]
 
@@ -157,6 +158,12 @@ def test_a_case_makes_a_chute_in_python(file):
     mine = read_chute(file)
     assert mine.scales == chuteflow.Scales(1e-3, 2500.0)
     assert mine.chute().roughness == 0.65
+
+
+def test_what_is_nearest_shows_itself_with_the_range_that_was_examined():
+    table = chuteflow.nearest(chuteflow.Chute(0.5, 0.8, 0.8, 0.6))._repr_html_()
+    assert "tan(theta) = 0.5 (26.57 degrees)" in table
+    assert "degrees)</td><td>" in table
 
 
 def test_a_case_shows_how_each_number_is_known():

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from chuteflow.cli import progress
+from chuteflow import progress
 from chuteflow.cli.program import main
 
 PAPER = "--slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6"

@@ -30,6 +30,19 @@ def test_secants_meet_the_size_that_is_asked_for(function, low, high, root):
     assert found == pytest.approx(root, rel=1e-9)
 
 
+def test_secants_of_a_smooth_function_are_few():
+    tried = []
+
+    def function(x):
+        tried.append(x)
+        return math.exp(x) - 2.0
+
+    found = secants(function, (0.0, 1.5), (-1.0, math.exp(1.5) - 2.0), 0.75, 1e-13)
+    assert found == pytest.approx(math.log(2.0), rel=1e-12)
+    # Both ends were halved at every step once, and each step won one bit.
+    assert len(tried) < 10
+
+
 @pytest.mark.parametrize(("function", "low", "high", "root"), FUNCTIONS.values(), ids=FUNCTIONS)
 def test_trials_stay_in_the_bracket_and_near_its_middle(function, low, high, root):
     del root

@@ -15,18 +15,20 @@ from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
 from chuteflow.bifurcations.starting_points import followed
 from chuteflow.bifurcations.system import SecondParameter
-from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, trace_boundary
+from chuteflow.bifurcations.tracing import CONTROL, BoundaryTracing, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.results import LineOfFlows, Searched
+from chuteflow.branches.results import Searched
 from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import ContinuationSettings
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
+from chuteflow.progress import told
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 from chuteflow.theory.constitutive import require_height
@@ -195,7 +197,7 @@ def boundary(
     surface_temperature: tuple[float, float] = SURFACE_TEMPERATURE,
     largest_holdup: float = LARGEST_HOLDUP,
     control: ContinuationSettings = CONTROL,
-    progress: Callable[[str, float], object] = lambda what, fraction: None,
+    progress: Callable[[str, float], object] | None = None,
 ) -> BoundarySet:
     """Follow every boundary of a kind over a range of a second parameter, through its turning points.
 
@@ -210,12 +212,27 @@ def boundary(
         surface_temperature: range of T_surface.
         largest_holdup: largest M.
         control: steps of the continuation.
-        progress: called with what is being done and the fraction of the range that is done.
+        progress: called with what is being done and the fraction of the range that is done; without it, a terminal or
+            notebook shows a line.
 
     Raises:
         InputError: for an unknown kind or parameter, or a range or number out of bounds.
         SolveError: where a boundary could not be followed or a point not solved to the tolerance.
     """
+    if progress is None:
+        with told("boundary", None) as tell:
+            return boundary(
+                chute,
+                of=of,
+                second=second,
+                bounds=bounds,
+                samples=samples,
+                tolerance=tolerance,
+                surface_temperature=surface_temperature,
+                largest_holdup=largest_holdup,
+                control=control,
+                progress=lambda what, fraction: tell(fraction),
+            )
     sweep = _checked(chute, of, second, bounds)
     samples = whole("samples", samples, 2, 1000)
     tolerance = checked_tolerance(tolerance)
@@ -230,7 +247,7 @@ def boundary(
             inside = within.contains(point.flow.solution.macroscopic)
             if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", fraction)
-                line = trace_boundary(point, within, tolerance, control, notice)
+                line = trace_boundary(point, BoundaryTracing(within, tolerance, control, notice))
                 # A point that could not be distinguished from those of a known line has led to it again.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]

@@ -58,6 +58,19 @@ class Nearest:
             numbers[self.quantity] = self.value
         return display.line("Nearest", None if numbers else "none among those examined", **numbers)
 
+    def _repr_html_(self) -> str:
+        rows = []
+        for name, value in self.parameters.items():
+            low, high = self.examined.get(name, (math.nan, math.nan))
+            found = "none" if value is None else display.number(value)
+            if name == "slope" and value is not None:
+                found += f" ({math.degrees(math.atan(value)):.4g} degrees)"
+            rows.append([PARAMETERS[name].symbol, found, f"{display.number(low)} to {display.number(high)}"])
+        if self.quantity is not None:
+            rows.append([self.quantity, "none" if self.value is None else display.number(self.value), ""])
+        caption = f"Nearest with a flow to {self.chute.summary}, one number changed at a time"
+        return display.html_table(caption, ["", "nearest", "examined"], rows)
+
 
 @on_one_thread
 @np.errstate(under="ignore")

@@ -7,7 +7,7 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,12 @@ from chuteflow.checks import number_in
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.contents import curve_content, limits_passed, short
-from chuteflow.explorer.heights import refine_heights
+from chuteflow.explorer.heights import sample_heights
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
-from chuteflow.explorer.sampled import FIELDS, TOP, budget, fields
+from chuteflow.explorer.sampled import FIELDS, TOP, budget
 from chuteflow.io import contract
+from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import PARAMETERS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
@@ -32,10 +33,10 @@ from chuteflow.steady.quantities import NUMBERS
 
 #: Relative error allowed: too small to be visible on a page. Exports use the default tolerance.
 _VISIBLE = 1e-6
-_CURVE_POINTS = 90
-#: A profile has so many intervals at first in the flow itself and as many up to where the profiles of all flows end;
-#: they are halved until linear interpolation across each is accurate to this fraction of a field's largest value.
-_INTERVALS, _STRAIGHT = 16, 1e-3
+#: Flows of the curve, which the page joins smoothly: half a pixel from the curve through very many.
+_CURVE_POINTS = 60
+#: Linear interpolation between two heights of a profile is accurate to this fraction of a field's largest value.
+_STRAIGHT = 7e-4
 #: Other errors of a computation, after which the process goes on.
 _FAILURES = (ArithmeticError, ValueError, LookupError)
 
@@ -126,10 +127,12 @@ def _place(flow: Flow) -> dict[str, Any]:
 
 def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
     """Fields over height, at heights so close that linear interpolation between them is accurate."""
-    highest = min(top, flow.interface_height)
-    own = min(TOP * flow.centre_of_mass, highest)
-    first = np.unique([np.linspace(0.0, end, _INTERVALS + 1) for end in (own, highest)])
-    heights, (found,) = refine_heights([partial(fields, flow)], first, _STRAIGHT)
+
+    def sample(log_share: Array) -> Array:
+        found = flow.at_overburden(np.exp(log_share))
+        return np.array([found.height, *(getattr(found, name) for name in FIELDS.values())])
+
+    heights, *found = sample_heights(sample, TOP * flow.centre_of_mass, min(top, flow.interface_height), _STRAIGHT)
     return {"z": short(heights)} | {name: short(field) for name, field in zip(FIELDS, found, strict=True)}
 
 

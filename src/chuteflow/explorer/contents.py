@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 from chuteflow.branches.results import KINDS, Branch, Curve
 from chuteflow.explorer import sentences
 from chuteflow.numerics.chebyshev import Array
+from chuteflow.steady.flow import rough_kinds
+from chuteflow.steady.kinds import density_kind
 from chuteflow.steady.quantities import NUMBERS, PLACE, Scales
 
 _DIGITS = 7
+#: A rough density excess nearer to zero than this does not tell the kind.
+_UNSURE = 1e-5
 
 
 def curve_content(found: Curve, scales: Scales | None) -> dict[str, Any]:
@@ -36,15 +39,13 @@ def _branch(branch: Branch) -> dict[str, Any]:
 def densities(branch: Branch) -> list[str]:
     """The kind of density of each flow of a branch.
 
-    It changes at the onsets of inversion, which are located, so that few flows have to be evaluated.
+    Flows whose rough density excess is close to zero are evaluated.
     """
-    onsets = [point.position + 1 for point in branch.special if point.kind == "density-inversion"]
-    found: list[str] = []
-    for first, end in pairwise([0, *onsets, len(branch.flows)]):
-        stretch = branch.flows[first:end]
-        kinds = {flow.density for flow in (*stretch[:1], *stretch[-1:])}
-        found += [*kinds] * len(stretch) if len(kinds) == 1 else [flow.density for flow in stretch]
-    return found
+    excess = rough_kinds([flow.solution for flow in branch.flows])[:, 0]
+    return [
+        density_kind(rough) if abs(rough) > _UNSURE else flow.density
+        for flow, rough in zip(branch.flows, excess.tolist(), strict=True)
+    ]
 
 
 def limits_passed(branch: Branch) -> list[tuple[str, ...]]:

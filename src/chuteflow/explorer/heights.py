@@ -11,8 +11,54 @@ from chuteflow.numerics.chebyshev import Array
 #: Fields (fields, heights) of a flow at heights.
 Sampler = Callable[[Array], Array]
 
+#: Height and fields (1 + fields, k) of a flow at logarithms (k,) of the fraction of the mass that lies above.
+OverburdenSampler = Callable[[Array], Array]
+
+#: Where the logarithm is looked at first, down to a fraction so small that nothing lies above, and the number of
+#: intervals to begin with.
+_SCOUTS, _AT_FIRST = -600.0 * 2.0 ** np.arange(-9.0, 1.0), 16
+#: Heights that differ by less than this fraction of the top are one.
+_ALIKE = 1e-6
 #: Largest number of times an interval is halved.
 _HALVINGS = 9
+
+
+def sample_heights(sample: OverburdenSampler, own: float, top: float, tolerance: float) -> Array:
+    """Heights from the base to ``top`` or somewhat above, and fields there, (1 + fields, k), between which linear
+    interpolation is accurate to the fraction ``tolerance`` of a field's largest value.
+
+    The flow proper reaches up to ``own``. Points are chosen by the mass above them: fields are known as functions of
+    that, and no height has to be looked for.
+    """
+    heights = sample(_SCOUTS)[0]
+    ends = [_SCOUTS[np.flatnonzero(np.append(heights[:-1] >= height, True))[0]] for height in (min(own, top), top)]
+    parts = (np.linspace(0.0, ends[0], _AT_FIRST + 1), np.log(np.linspace(1.0, np.exp(ends[0]), _AT_FIRST + 1)))
+    places = np.unique(np.concatenate([*parts, np.linspace(*ends, _AT_FIRST // 2)]))[::-1]
+    found = sample(places)
+    refine = np.ones(len(places) - 1, dtype=bool)
+    for _ in range(_HALVINGS):
+        middles = 0.5 * (places[1:] + places[:-1])[refine]
+        exact = sample(middles)
+        below, above = found[:, :-1][:, refine], found[:, 1:][:, refine]
+        width = above[0] - below[0]
+        weight = np.divide(exact[0] - below[0], width, out=np.zeros_like(width), where=width > 0.0)
+        linear = below + weight * (above - below)
+        largest = np.abs(found).max(axis=1, keepdims=True)
+        inaccurate = (np.abs(exact - linear) > tolerance * largest)[1:].any(axis=0) & (below[0] < top)
+        between = np.flatnonzero(refine) + 1
+        places, found = np.insert(places, between, middles), np.insert(found, between, exact, axis=1)
+        # Both halves of a refined interval are checked again.
+        halves = np.where(refine, 2, 1)
+        refine[refine] = inaccurate
+        refine = np.repeat(refine, halves)
+        if not inaccurate.any():
+            break
+    # Close to an interface heights differ by rounding alone.
+    apart = np.concatenate([[True], np.diff(found[0]) > _ALIKE * top])
+    kept = found[:, apart]
+    if kept[0, -1] < top:
+        kept = np.concatenate([kept, [[top], *found[1:, -1:]]], axis=1)
+    return kept[:, : int(np.searchsorted(kept[0], top)) + 1]
 
 
 def refine_heights(samplers: Sequence[Sampler], heights: Array, tolerance: float) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from chuteflow.checks import number_in, shown
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
-from chuteflow.steady.cases import CASES, GUESSED, Case
+from chuteflow.steady.cases import CASES, GUESSED, TYPICAL, Case
 from chuteflow.steady.chute import SURFACES, Chute
 from chuteflow.steady.quantities import Scales
 from chuteflow.theory.laws import LAWS, runs_code
@@ -48,7 +48,7 @@ CONTROLS = {
         False,
         "How deep a grain sinks between the grains fixed to the base.",
     ),
-    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time, in ρd√(gd cos θ)."),
+    "Q": Control("Mass flux", "Q", *FLUX_RANGE, True, "Mass per unit width and time; if not in SI, in ρd√(gd cos θ)."),
 }
 
 
@@ -119,8 +119,9 @@ def _state(one: Case) -> dict[str, float | str]:
 
 def _known(one: Case) -> str:
     numbers = {**one.numbers, **one.grains}
-    guessed = [key for key, known in numbers.items() if known.how == GUESSED]
-    told = f" Guessed: {', '.join(guessed)}; replace them by your own values." if guessed else ""
+    kinds = {how: [key for key, known in numbers.items() if known.how == how] for how in (TYPICAL, GUESSED)}
+    said = "; ".join(f"{how}: {', '.join(keys)}" for how, keys in kinds.items() if keys)
+    told = f" {said[:1].upper()}{said[1:]}; replace them by your own values." if said else ""
     return f"{one.name}: {one.description}.{told}"
 
 

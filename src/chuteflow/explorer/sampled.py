@@ -7,7 +7,7 @@ line. Flows solved half-way between them give the error.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -90,11 +90,23 @@ def sample_curve(
         SolveError: where a branch could not be followed.
     """
     within = {"surface_temperature": surface_temperature, "largest_holdup": largest_holdup}
-    stored = curve(chute, points=points, tolerance=_TOLERANCE, **within)
     between = curve(chute, points=2 * points - 1, tolerance=_TOLERANCE, **within)
+    halves = all(len(branch.flows) % 2 for branch in between.branches)
+    # A branch with an even number of flows has no half that ends where it does.
+    stored = _every_second(between) if halves else curve(chute, points=points, tolerance=_TOLERANCE, **within)
     branches = tuple(map(_sampled, stored.branches))
     pairs = zip(branches, between.branches, strict=True)
     return SampledCurve(stored, branches, _largest([_deviation(one, other) for one, other in pairs]))
+
+
+def _every_second(found: Curve) -> Curve:
+    """The curve through every second flow, from end to end of each branch."""
+    branches = []
+    for branch in found.branches:
+        flows = branch.flows[::2]
+        special = (replace(one, position=min(one.position // 2, len(flows) - 2)) for one in branch.special)
+        branches.append(replace(branch, flows=flows, special=tuple(special)))
+    return replace(found, branches=tuple(branches))
 
 
 def interpolate(table: Array, positions: Array) -> Array:

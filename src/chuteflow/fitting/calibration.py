@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,6 +23,7 @@ from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.fitting.starts import MANY_TRIALS, StartingPoint, at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
+from chuteflow.progress import told
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, chosen_parameters, varied
@@ -266,6 +267,7 @@ def fit(
     confidence: float = CONFIDENCE,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     trials: int | None = None,
+    progress: Callable[[float], Any] | None = None,
 ) -> Fit:
     """The parameters ``free`` of a chute with which its flows come nearest to what was measured.
 
@@ -278,6 +280,7 @@ def fit(
         confidence: of the intervals.
         ranges: between which values parameters are searched for first, by name.
         trials: how many trial chutes the search starts from.
+        progress: called with the fraction of them that was followed; without it, a terminal or notebook shows a line.
 
     Raises:
         InputError: for unknown names, or fewer values than unknowns.
@@ -294,7 +297,8 @@ def fit(
     objective = Objective(cases, base_height, loss)
     _require_enough(objective)
     first = [np.array([parameter.of(chute) for parameter in parameters])]
-    best, others = _searched(objective, first, trials)
+    with told("fit", progress) as tell:
+        best, others = _searched(objective, first, trials, tell)
     for _ in range(_ROUNDS):
         scale, covariance = _spread(objective, best, measured.errors_known)
         rise = _rise(confidence, objective.count - objective.unknowns, scale, measured.errors_known)
@@ -327,22 +331,27 @@ def _require_enough(objective: Objective) -> None:
         )
 
 
-def _searched(objective: Objective, first: list[Array], trials: int | None) -> tuple[Minimum, list[Minimum]]:
+def _searched(
+    objective: Objective, first: list[Array], trials: int | None, tell: Callable[[float], Any]
+) -> tuple[Minimum, list[Minimum]]:
     """The best fit, and the other minima that starts led to: from more trial chutes where those that are tried first
     lead to nothing that resembles the measurements."""
     if trials is not None:
-        return _searched_from(objective, candidates(objective, first, trials))
+        return _searched_from(objective, candidates(objective, first, trials), tell)
     with suppress(InputError):
-        best, others = _searched_from(objective, candidates(objective, first))
+        best, others = _searched_from(objective, candidates(objective, first), tell)
         if best.chi2 < _HOPELESS * objective.count:
             return best, others
-    return _searched_from(objective, candidates(objective, first, MANY_TRIALS))
+    return _searched_from(objective, candidates(objective, first, MANY_TRIALS), tell)
 
 
-def _searched_from(objective: Objective, starts: Sequence[StartingPoint]) -> tuple[Minimum, list[Minimum]]:
+def _searched_from(
+    objective: Objective, starts: Sequence[StartingPoint], tell: Callable[[float], Any]
+) -> tuple[Minimum, list[Minimum]]:
     kept: list[Minimum] = []
     left = []
-    for start in starts:
+    for i, start in enumerate(starts):
+        tell(i / len(starts))
         # Most starts are on their way to one minimum: it is looked for from the most promising of them.
         one = objective.minimise(
             objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY, known=kept

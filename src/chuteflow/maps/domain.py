@@ -34,6 +34,7 @@ from chuteflow.maps.outlines import Outline, Region, make_regions, trace_outline
 from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, classify, classify_hot
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
+from chuteflow.progress import told
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
@@ -199,7 +200,8 @@ def domain(
         largest_holdup: range searched.
         workers: processes. With 1 all is done in this one; with more, a script needs the usual
             ``if __name__ == "__main__":`` around what it does.
-        progress: told how many columns are done, and how many are known to be needed.
+        progress: told how many columns are done, and how many are known to be needed; without it, a terminal or
+            notebook shows a line.
 
     Raises:
         InputError: for a size, tolerance, temperature or range out of bounds, or where a corner is no chute.
@@ -221,7 +223,11 @@ def domain(
     x, y = (axis if isinstance(axis, ParameterAxis) else ParameterAxis(*axis) for axis in (x, y))
     plane = ParameterPlane(x, y, chute, temperatures, within)
     with _pool(workers) as pool:
-        columns = _columns(plane, tolerance, pool, progress or (lambda done, known: None))
+        if progress is not None:
+            columns = _columns(plane, tolerance, pool, progress)
+        else:
+            with told("domain", None) as tell:
+                columns = _columns(plane, tolerance, pool, lambda done, known: tell(done / known))
     hot_columns = _hot_columns(plane, tolerance) if plane.hot_known else ()
     return Domain.on_cells(plane, size, tolerance, tuple(columns), tuple(hot_columns))
 

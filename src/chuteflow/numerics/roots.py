@@ -37,16 +37,19 @@ def secants(
     """The root of ``function`` between the ends of ``bracket``, where it has ``values``, the first below zero and the
     second above: by secants from ``start``, until a value is below ``small`` in size.
 
-    The end of the bracket that stays counts for half, as in the Illinois method, so that both ends move.
+    The value at an end of the bracket that stays twice in a row is halved, as in the Illinois method, so that both ends
+    move.
     """
     (low, high), (below, above) = bracket, values
-    x = start
+    x, side = start, 0
     for _ in range(most):
         value = function(x)
         if value < 0.0:
-            low, below, above = x, value, 0.5 * above
+            low, below, above = x, value, 0.5 * above if side < 0 else above
+            side = -1
         else:
-            high, below, above = x, 0.5 * below, value
+            high, above, below = x, value, 0.5 * below if side > 0 else below
+            side = 1
         if abs(value) < small or not below < 0.0 < above:
             break
         x = low - below * (high - low) / (above - below)

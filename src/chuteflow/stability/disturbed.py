@@ -11,6 +11,7 @@ from chuteflow.branches.curve import curve
 from chuteflow.branches.results import Branch, Curve
 from chuteflow.checks import number
 from chuteflow.errors import InputError
+from chuteflow.progress import told
 from chuteflow.stability import relaxation
 from chuteflow.stability.layer import Layer
 from chuteflow.stability.planes import FamilyMap, WaveMap, family_map, wave_map
@@ -40,12 +41,13 @@ def growth(
         kx: range of wavenumbers along the slope, in 1/d; by default to three times that of the fastest growing mode.
         ky: range of wavenumbers across the slope.
         size: points along kx and ky.
-        progress: called with the fraction that is done.
+        progress: called with the fraction that is done; without it, a terminal or notebook shows a line.
 
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
     """
-    return wave_map(flow, kx=kx, ky=ky, size=size, **_watched(progress))
+    with told("growth", progress) as tell:
+        return wave_map(flow, kx=kx, ky=ky, size=size, progress=tell)
 
 
 def neutral(
@@ -64,7 +66,7 @@ def neutral(
         angle: of the waves to the slope, in degrees: 0 along it, 90 across.
         depth_wavenumber: range of k h, with h the centre of mass.
         size: points along k h and along the branch.
-        progress: called with the fraction that is done.
+        progress: called with the fraction that is done; without it, a terminal or notebook shows a line.
 
     Raises:
         InputError: for numbers out of range, a chute without flows, and where stability cannot be posed.
@@ -76,7 +78,8 @@ def neutral(
             raise InputError(f"there is no flow: {line.reason}")
         line = line.branches[0]
     flows = line.flows if isinstance(line, Branch) else tuple(line)
-    return family_map(flows, angle=angle, depth_wavenumber=depth_wavenumber, size=size, **_watched(progress))
+    with told("neutral", progress) as tell:
+        return family_map(flows, angle=angle, depth_wavenumber=depth_wavenumber, size=size, progress=tell)
 
 
 def relax(
@@ -94,7 +97,7 @@ def relax(
         temperature: factor on the granular temperature at the start; 1.1 by default, or 1 where a velocity is given.
         velocity: factor on the velocity at the start; 1 by default.
         duration: time, in sqrt(d/(g cos theta)).
-        progress: called with the time that is reached.
+        progress: called with the time that is reached; without it, a terminal or notebook shows a line.
 
     Raises:
         InputError: for a factor or duration out of range.
@@ -108,12 +111,8 @@ def relax(
     layer = Layer.of(flow)
     start = disturb(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
     moments = []
-    for moment in relaxation.relax(layer, start, duration):
-        moments.append(moment)
-        if progress is not None:
-            progress(moment.time)
+    with told("relax", None if progress is None else lambda _: progress(moments[-1].time)) as tell:
+        for moment in relaxation.relax(layer, start, duration):
+            moments.append(moment)
+            tell(moment.time / duration)
     return Relaxation(flow, tuple(moments), outcome(layer, moments))
-
-
-def _watched(progress: Progress | None) -> dict[str, Progress]:
-    return {} if progress is None else {"progress": progress}

@@ -1,4 +1,4 @@
-"""Chutes and materials by name: the paper's chutes, and common grains with the source of each number.
+"""Chutes and materials by name: the paper's chutes, and common grains with what is known of each number.
 
 A case says some or all of the numbers of a chute, and for materials the grains too, with which results take SI units.
 """
@@ -16,14 +16,15 @@ from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute, slope_of
 from chuteflow.steady.quantities import GRAINS, Scales
 
-#: How a number of a case is known.
-MEASURED, GUESSED, DEFINED = "measured", "guessed", "defined"
+#: How a number of a case is known: reported for such grains, but not checked against the source; guessed; or part of
+#: what the case is.
+TYPICAL, GUESSED, DEFINED = "typical", "guessed", "defined"
 
 
 @dataclass(frozen=True)
 class CaseNumber:
-    """A number of a case: its ``value``, ``how`` it is known, its ``uncertainty`` (one standard deviation of what was
-    measured, or a range for what is guessed; None for what is defined) and its ``source``."""
+    """A number of a case: its ``value``, ``how`` it is known, its ``uncertainty`` (by how much grains of this kind, or
+    guesses, differ; None for what is defined) and its ``source``."""
 
     value: float
     how: str = DEFINED
@@ -141,8 +142,9 @@ def _paper(slope: float, e: float, ew: float, roughness: float) -> dict[str, Cas
     return {key: CaseNumber(value) for key, value in (("slope", slope), ("e", e), ("ew", ew), ("roughness", roughness))}
 
 
-_FOERSTER = "Foerster, Louge, Chang & Allia 1994, Phys. Fluids 6, 1108"
-_LORENZ = "Lorenz, Tuozzolo & Louge 1997, Exp. Mech. 37, 292"
+#: Measurements that such values come from; they were not at hand to check the values.
+_FOERSTER = "as of Foerster, Louge, Chang & Allia 1994, Phys. Fluids 6, 1108; not checked against it"
+_LORENZ = "as of Lorenz, Tuozzolo & Louge 1997, Exp. Mech. 37, 292; not checked against it"
 _GLUED = "grains glued to the base with gaps between none and a grain; see the page on choosing e, e_w and r"
 
 #: All cases by name.
@@ -163,26 +165,26 @@ CASES: dict[str, Case] = {
             "glass-beads",
             "soda-lime glass beads, 3 mm, on a rough base of aluminium",
             {
-                "e": CaseNumber(0.97, MEASURED, 0.01, _FOERSTER),
-                "ew": CaseNumber(0.83, MEASURED, 0.02, f"on aluminium; {_FOERSTER}"),
+                "e": CaseNumber(0.97, TYPICAL, 0.02, _FOERSTER),
+                "ew": CaseNumber(0.83, TYPICAL, 0.04, f"on a plate of aluminium; {_FOERSTER}"),
                 "roughness": CaseNumber(0.65, GUESSED, 0.1, _GLUED),
             },
             grains={
-                "diameter": CaseNumber(3e-3, MEASURED, 5e-5, _FOERSTER),
-                "density": CaseNumber(2500.0, MEASURED, 50.0, "handbooks, soda-lime glass"),
+                "diameter": CaseNumber(3e-3, DEFINED),
+                "density": CaseNumber(2500.0, TYPICAL, 50.0, "soda-lime glass"),
             },
         ),
         Case(
             "steel",
             "stainless steel balls, 3 mm, on a rough base of steel",
             {
-                "e": CaseNumber(0.95, MEASURED, 0.03, _LORENZ),
+                "e": CaseNumber(0.95, TYPICAL, 0.05, _LORENZ),
                 "ew": CaseNumber(0.9, GUESSED, 0.07, "a thick plate of steel loses somewhat more than two balls do"),
                 "roughness": CaseNumber(0.65, GUESSED, 0.1, _GLUED),
             },
             grains={
                 "diameter": CaseNumber(3e-3, DEFINED),
-                "density": CaseNumber(7900.0, MEASURED, 100.0, "handbooks, stainless steel"),
+                "density": CaseNumber(7900.0, TYPICAL, 150.0, "stainless steel"),
             },
         ),
         Case(
@@ -195,7 +197,7 @@ CASES: dict[str, Case] = {
             },
             grains={
                 "diameter": CaseNumber(5e-4, DEFINED),
-                "density": CaseNumber(2650.0, MEASURED, 30.0, "handbooks, quartz"),
+                "density": CaseNumber(2650.0, TYPICAL, 30.0, "quartz"),
             },
         ),
     )

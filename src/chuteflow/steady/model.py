@@ -77,17 +77,17 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
         (there,) = log_ratio.values(closure_coordinate(scaled_breaks))
         breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(there)))
     nodes = _nodes(tuple(breaks_of_x.tolist()))
-    ratio = _invert(log_ratio, nodes.argument)  # of room-scaled density to x
+    ratio = _invert(log_ratio, nodes.argument)  # of density scaled by the free fraction to x
     scaled = nodes.argument * np.exp(ratio)
     r = reduce(chosen, scaled, e, slope)
-    log_room = -np.log1p(scaled * (1.0 / chosen.densest))
+    log_free_fraction = -np.log1p(scaled * (1.0 / chosen.densest))
     k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
     if np.all(b == 0.0):
         (gamma,) = big_gamma.values(closure_coordinate(scaled))
     else:
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
-        gamma = -(ratio + log_room + np.log(r.compressibility))
-    values = [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + log_room, gamma]
+        gamma = -(ratio + log_free_fraction + np.log(r.compressibility))
+    values = [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + log_free_fraction, gamma]
     return nodes.pieces.table(np.stack(values, axis=-1))
 
 
@@ -123,12 +123,12 @@ def _density_tables(
     ``breaks`` are places where the law is not smooth."""
     nodes = _nodes(breaks)
     r = reduce(chosen, nodes.argument, e, slope)
-    room = 1.0 / (1.0 + nodes.argument / chosen.densest)
-    rate = r.coupling * room**2  # dGamma/dscaled
+    free_fraction = 1.0 / (1.0 + nodes.argument / chosen.densest)
+    rate = r.coupling * free_fraction**2  # dGamma/dscaled
     gamma = antiderivative(nodes.pieces.table((rate * nodes.by_coordinate)[:, None]))
     (big_gamma,) = gamma.values(nodes.pieces.x)
-    log_g, log_room = np.log(r.compressibility), np.log(room)
-    log_ratio = log_room + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
+    log_g, log_free_fraction = np.log(r.compressibility), np.log(free_fraction)
+    log_ratio = log_free_fraction + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
     return nodes.pieces.table(log_ratio[:, None]), gamma
 
 

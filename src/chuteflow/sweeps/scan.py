@@ -16,6 +16,7 @@ from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE
+from chuteflow.progress import told
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.sweeps.engine import Chunk, solve_chunk
@@ -107,7 +108,7 @@ def scan(
         tolerance: relative error allowed in Q, h and M.
         surface_temperature: range searched.
         largest_holdup: range searched.
-        progress: called with the fraction that is done.
+        progress: called with the fraction that is done; without it, a terminal or notebook shows a line.
         parameters: ``slope``, ``restitution`` or ``e``, ``wall_restitution`` or ``ew``, ``roughness``, and one of
             ``Q``, ``M``, ``h`` and ``T_surface``: numbers, or one-dimensional arrays, which become axes in their order.
 
@@ -132,10 +133,10 @@ def scan(
     }
     study = from_dict(table, Path())
     chunks: list[Chunk] = []
-    for number in range(study.chunks):
-        chunks.append(solve_chunk(study, number))
-        if progress is not None:
-            progress(len(chunks) / study.chunks)
+    with told("scan", progress) as tell:
+        for number in range(study.chunks):
+            chunks.append(solve_chunk(study, number))
+            tell(len(chunks) / study.chunks)
     shape = tuple(len(values) for values in axes.values())
     fixed = {name: value for name, value in given.items() if name not in axes}
     return Scan(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chuteflow.processes import available_cores
+from chuteflow.progress import told
 from chuteflow.sweeps.runner import local_workers, run
 from chuteflow.sweeps.store import Store
 from chuteflow.sweeps.study import Study, from_dict, read
@@ -29,7 +30,7 @@ def sweep(
         study: a TOML file, its table as a dictionary, or a study.
         out: the store to create or continue.
         workers: processes; one for each core by default.
-        progress: called with the fraction that is done.
+        progress: called with the fraction that is done; without it, a terminal or notebook shows a line.
 
     Raises:
         InputError: for a study that is none, or a store that is of another one.
@@ -44,8 +45,8 @@ def sweep(
         left = [chunk for chunk in range(study.chunks) if not store.is_done(chunk)]
         store.mend()
         done = study.chunks - len(left)
-        for _ in run(store, left, local_workers(available_cores() if workers is None else workers)):
-            done += 1
-            if progress is not None:
-                progress(done / study.chunks)
+        with told("sweep", progress) as tell:
+            for _ in run(store, left, local_workers(available_cores() if workers is None else workers)):
+                done += 1
+                tell(done / study.chunks)
     return store.path

@@ -12,7 +12,7 @@ COMMANDS = {
     "fit": "The parameters of a chute from measurements, with their uncertainties.",
     "predict": "Flows of a fitted chute with bands, also at another slope.",
     "design": "The chutes that have a flow with given numbers, such as a flux of 3 at a hold-up of 1.",
-    "cases": "The chutes and materials that --case takes, with the source of each number.",
+    "cases": "The chutes and materials that --case takes, and how each number is known.",
     "closures": "The constitutive laws, their parameters, and the functions of one of them.",
     "compare-closures": "The flows of one chute under several constitutive laws, compared.",
     "figures": "Draw figures of the paper.",

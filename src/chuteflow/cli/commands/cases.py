@@ -67,13 +67,13 @@ def _list(chosen: list[Case]) -> Iterator[str]:
         rows.append([one.name, *(_cell(numbers[key]) if key in numbers else "-" for key in keys), one.description])
     yield tables.table(rows, words=(0, len(keys) + 1))
     yield ""
-    yield "? guessed; chuteflow cases NAME shows how each number is known and how well"
+    yield "~ typical of such grains, not checked against a source; ? guessed; chuteflow cases NAME shows each number"
 
 
 def _cell(known: CaseNumber) -> str:
-    from chuteflow.steady.cases import GUESSED
+    from chuteflow.steady.cases import GUESSED, TYPICAL
 
-    return f"{known.value:g}{'?' if known.how == GUESSED else ''}"
+    return f"{known.value:g}{ {TYPICAL: '~', GUESSED: '?'}.get(known.how, '') }"
 
 
 def _spread(known: CaseNumber) -> str:

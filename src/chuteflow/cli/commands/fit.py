@@ -10,6 +10,7 @@ import numpy as np
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
+from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 
@@ -91,7 +92,9 @@ def command(**given: Any) -> None:
         raise InputError("missing --slope or --angle, or a column of the file: what is the slope of the chute?")
     settings: dict[str, Any] = {"base_height": given["base_height"], "ranges": dict(given["ranges"])}
     settings |= {name: given[name] for name in ("loss", "confidence", "trials") if given[name] is not None}
-    found = compare(measured, chute, free, closures, **settings)
+    with Progress(seconds=0.5) as progress:
+        settings["progress"] = lambda fraction: progress.show(f"{fraction:.0%} of the trial chutes")
+        found = compare(measured, chute, free, closures, **settings)
 
     def plotted() -> Figure:
         from chuteflow.plotting.fit_plot import plot_fit

@@ -36,7 +36,8 @@ def command(**given: Any) -> None:
     """Solve, differentiate, print, save and draw."""
     options.require_outputs(given, (".csv", ".json"))
     chute = options.chute(given)
-    condition: dict[str, Any] = options.condition(given, chute, options.scales(given))
+    scales = options.scales(given)
+    condition: dict[str, Any] = options.condition(given, chute, scales)
     from chuteflow.branches.enumeration import flows
     from chuteflow.io import contract
     from chuteflow.io.sensitivity_records import sensitivity_object, sensitivity_rows
@@ -64,7 +65,7 @@ def command(**given: Any) -> None:
     options.deliver_object(
         given,
         content,
-        _report(answers, found.reason),
+        _report(answers, found.reason, in_own_units=scales is not None),
         lambda: (row for one in answers for row in sensitivity_rows(one)),
         plotted,
     )
@@ -76,7 +77,7 @@ def _heights(found: Sensitivity) -> Any:
     return np.linspace(0.0, found.flow.depth, _HEIGHTS)
 
 
-def _report(answers: list[Sensitivity], reason: str | None) -> Iterator[str]:
+def _report(answers: list[Sensitivity], reason: str | None, *, in_own_units: bool) -> Iterator[str]:
     from chuteflow.io import tables, words
     from chuteflow.steady.quantities import NUMBERS
 
@@ -84,6 +85,8 @@ def _report(answers: list[Sensitivity], reason: str | None) -> Iterator[str]:
         yield f"no flow: {reason}"
         return
     yield words.chute(answers[0].flow.chute)
+    if in_own_units:
+        yield "numbers are dimensionless: the scales of SI units change with the slope, one of the parameters"
     for number, found in enumerate(answers, 1):
         flow = found.flow
         yield ""

@@ -55,9 +55,17 @@ function scale({ low, high, log }, from, to) {
 
 const known = ([a, b]) => Number.isFinite(a) && Number.isFinite(b);
 
-function path(points, sx, sy) {
+const shortly = (v) => v.toFixed(1);
+
+/** A line through points; a smooth one has cubics between them, whose tangents are parallel to the chords of the neighbours. */
+function path(points, sx, sy, smooth = false) {
   const placed = points.map(([a, b]) => [sx(a), sy(b)]).filter(known);
-  return placed.map(([a, b], i) => `${i ? "L" : "M"}${a.toFixed(1)} ${b.toFixed(1)}`).join("");
+  const near = (i, from, sign) => {
+    const [before, after] = [placed[Math.max(0, i - 1)], placed[Math.min(placed.length - 1, i + 1)]];
+    return from.map((v, k) => shortly(v + (sign * (after[k] - before[k])) / 6)).join(" ");
+  };
+  const curved = (here, i) => `C${near(i - 1, placed[i - 1], 1)} ${near(i, here, -1)} ${here.map(shortly).join(" ")}`;
+  return placed.map((here, i) => (i && smooth ? curved(here, i) : `${i ? "L" : "M"}${here.map(shortly).join(" ")}`)).join("");
 }
 
 /** A label as SVG markup: what follows "_" is a subscript. */
@@ -104,13 +112,13 @@ function axes(x, y, sx, sy, { l, r, t, b }, height, levels) {
  * Draw into `svg`, without what cannot be placed; returns the scales `sx`, `sy` and the frame `box`.
  *
  * `x` and `y`: {low, high, log, label}, `y.bare` without numbers. `areas`: {rings, colour}, hatched without a
- * colour. `points`: {x, y, across, up (errors), shape, colour, title}, beneath all lines. `lines`: {points, colour, dash, width, beneath}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
+ * colour. `points`: {x, y, across, up (errors), shape, colour, title}, beneath all lines. `lines`: {points, colour, dash, width, beneath, smooth}. `marks`: {x, y, shape, title, and of a "dot" flow, colour, chosen}. `hair`: x of a line up.
  */
 export function draw(svg, { x: across, y: up, areas = [], points: measured = [], lines = [], marks = [], hair }) {
   const x = drawable(across), y = drawable(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
-  // Room for the numbers, of some 6.6 pixels a digit, and for what they are of.
+  // Space for the numbers, of some 6.6 pixels a digit, and for the label.
   const digits = y.bare ? 0 : Math.max(...levels.map((v) => number(v, 3).length));
   const box = { l: Math.round(digits * 6.6) + (y.label ? 28 : 12), r: width - 10, t: 10, b: height - 36 };
   const sx = scale(x, box.l, box.r), sy = scale(y, box.b, box.t);
@@ -123,8 +131,8 @@ export function draw(svg, { x: across, y: up, areas = [], points: measured = [],
     const [px, py, l, r, t, b] = [sx(point.x), sy(point.y), sx(point.x - (point.across ?? 0)), sx(point.x + (point.across ?? 0)), sy(point.y + (point.up ?? 0)), sy(point.y - (point.up ?? 0))].map((v) => (Number.isFinite(v) ? v.toFixed(1) : "0"));
     inside.push(`<g class="measured" stroke="${point.colour}"><path d="M${l} ${py}H${r}M${px} ${t}V${b}"/>${measuredShapes[point.shape](Number(px), Number(py))}<title>${escaped(point.title)}</title></g>`);
   }
-  for (const { points, colour, dash, width: thick = 2, beneath } of lines) {
-    inside.push(`<path class="${beneath ? "beneath" : "line"}" stroke="${colour}" d="${path(points, sx, sy)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
+  for (const { points, colour, dash, width: thick = 2, beneath, smooth } of lines) {
+    inside.push(`<path class="${beneath ? "beneath" : "line"}" stroke="${colour}" d="${path(points, sx, sy, smooth)}"${dash ? ` stroke-dasharray="${dash}"` : ""} stroke-width="${thick}"/>`);
   }
   if (known([sx(hair), 0])) inside.push(`<path class="hair" d="M${sx(hair).toFixed(1)} ${box.t}V${box.b}"/>`);
   for (const mark of marks.filter((one) => known([sx(one.x), sy(one.y)]))) {

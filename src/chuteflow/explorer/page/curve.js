@@ -106,9 +106,9 @@ function* stretches(branch, kind) {
 /** Lines of a branch: by the kind of density, over a band where the flows are outside the limits of the theory. */
 function linesOf(branch, at) {
   const points = ([i, j]) => Array.from({ length: j - i + 1 }, (_, k) => at(i + k)), beyond = (i) => Boolean(wordsAt(branch, i)?.length);
-  const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true }));
+  const bands = [...stretches(branch, beyond)].filter(([i]) => beyond(i)).map((ends) => ({ points: points(ends), colour: colour("--beyond"), width: 9, beneath: true, smooth: true }));
   const dash = ([i]) => (branch.density[i] === "monotonic" ? "7 4" : "");
-  return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends) }))];
+  return [...bands, ...[...stretches(branch, (i) => branch.density[i])].map((ends) => ({ points: points(ends), colour: colour("--curve"), dash: dash(ends), smooth: true }))];
 }
 
 /** Where the words on a branch change: the first point of each stretch but the first. */
@@ -178,7 +178,7 @@ export function redraw() {
   const axis = ({ low, high, log }, s, label) => ({ low: low * s, high: high * s, log, label });
   for (const { flow, chute, curve: other, letter, dash, colour: ink } of pinned()) {
     const [q, n] = [factor("Q", chute.slope), factor(name, chute.slope)];
-    for (const branch of other?.branches ?? []) lines.push({ points: branch.Q.map((value, i) => [value * q, branch[name][i] * n]), colour: ink, dash, width: 1.5 });
+    for (const branch of other?.branches ?? []) lines.push({ points: branch.Q.map((value, i) => [value * q, branch[name][i] * n]), colour: ink, dash, width: 1.5, smooth: true });
     marks.push({ x: flow.Q * q, y: flow[name] * n, shape: "pin", letter, title: `pinned: ${flow.name}` });
   }
   for (const branch of curve.branches) {

@@ -5,7 +5,12 @@ const canvas = byId("chute"), key = byId("chute-key"), pause = byId("pause");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 // Smallest and largest number of grains, and of their radii in pixels.
 const fewest = 25, most = 1500, smallest = 1.5, largest = 12;
-let view = null, grains = [], running = !still.matches, last = 0;
+// Milliseconds after a change of the sliders for which grains do not move: redraws come first.
+const rest = 200;
+let view = null, grains = [], running = !still.matches, last = 0, until = 0;
+
+/** The sliders move: the picture changes with the flow alone. */
+export function pauseBriefly() { until = performance.now() + rest; }
 
 /** Value of a field at a height, between its points. */
 function at(field, z, height) {
@@ -122,7 +127,7 @@ function frame(now) {
   const dt = Math.min(0.05, (now - last) / 1000);
   last = now;
   if (!running) return;
-  if (view && !document.hidden) paint(dt);
+  if (view && !document.hidden && now > until) paint(dt);
   requestAnimationFrame(frame);
 }
 

@@ -20,7 +20,7 @@ setQuantities(about.quantities);
 start({ ...about.presets[0].state, ...about.first }, about.fixed);
 byId("version").textContent = about.version;
 
-let flows = null, mark = 0;
+let flows = null, mark = 0, restDue = false;
 const chosen = () => Math.max(0, Math.min(Number(state.flow) || 0, (flows?.flows.length ?? 1) - 1));
 
 /** Change the state because of `event`, whose time the redraw is measured from. What is done with one click is a step of its own. */
@@ -97,6 +97,7 @@ onChange((has) => {
     forgetColours();
   }
   const words = has("si", "d", "rho");
+  if (ofChute(has) || has("Q")) chutePicture.pauseBriefly();
   if (ofChute(has) || has("Q") || words) askFlows();
   if (ofChute(has) || words) askCurve();
   showControls();
@@ -129,8 +130,14 @@ function showFlows() {
   pins.show();
   drawProfiles(list, flows.top, k, pins.pinned());
   curve.takeFlows(list, k);
-  // The rest is drawn a frame later, so that flows and profiles follow the slider without delay.
-  requestAnimationFrame(() => setTimeout(showRest));
+  showRestLater();
+}
+
+/** The rest is drawn a frame later, once for several answers, so that flows and profiles follow the slider without delay. */
+function showRestLater() {
+  if (restDue) return;
+  restDue = true;
+  requestAnimationFrame(() => setTimeout(() => { restDue = false; showRest(); }, 30));
 }
 
 /** Panels of the chosen flow alone, and how to compute it. */
