@@ -70,13 +70,21 @@ def solve_chunk(study: Study, chunk: int) -> Chunk:
     out.reason[~valid] = Reason.NO_ANSWER
     batched = valid & _in_batches(study, out.parameters)
     searched = valid & ~batched
-    for closure, surface, points in _groups(study, out.parameters, batched):
-        solved = _solved(study, _batch(closure, surface, out.parameters, points), out.parameters["T_surface"][points])
+    batches = list(_batches(study, out.parameters, batched))
+    for batch, points in batches:
+        solved = _solved(study, batch, out.parameters["T_surface"][points])
         _fill(study, out, points, solved)
         searched[points[solved.unsettled]] = True
     for point in np.flatnonzero(searched).tolist():
         _fill_singly(study, out, point, failures)
-    _fill_reasons(study, out)
+    none = (out.n_flows == 0) & (out.status == PointStatus.COMPLETE)
+    others = _on_other_bases(study, out.parameters)
+    out.reason[none & others] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
+    # What is proved is known of the base of the paper.
+    for batch, points in [*batches, *_batches(study, out.parameters, none & ~batched & ~others)]:
+        some = np.flatnonzero(none[points])
+        if some.size:
+            out.reason[points[some]] = reasons(batch.take(some))
     found_failures = {first + i: why for i, why in sorted(failures.items())}
     return replace(out, failures=found_failures, singly=int(searched.sum()))
 
@@ -153,21 +161,15 @@ def _meaningful(closure: Law) -> NDArray[np.bool_]:
     return good
 
 
-def _groups(
-    study: Study, parameters: Mapping[str, Array], valid: NDArray[np.bool_]
-) -> Iterator[tuple[Law, str, Indices]]:
-    """Closure, surface and points of the groups that share both."""
+def _batches(study: Study, parameters: Mapping[str, Array], some: NDArray[np.bool_]) -> Iterator[tuple[Batch, Indices]]:
+    """Batches of some of the points (n,), which share closure and surface, and these points."""
     for i, closure in enumerate(study.laws):
         for j, surface in enumerate(SURFACES):
-            points = np.flatnonzero(valid & (parameters["closure"] == i) & (parameters["surface"] == j))
+            points = np.flatnonzero(some & (parameters["closure"] == i) & (parameters["surface"] == j))
             if points.size:
-                yield closure, surface, points
-
-
-def _batch(closure: Law, surface: str, parameters: Mapping[str, Array], points: Indices) -> Batch:
-    roughness = np.minimum(parameters["roughness"][points], BY_KEY["roughness"].high)
-    slope, e, ew = (np.ascontiguousarray(parameters[name][points]) for name in ("slope", "e", "ew"))
-    return Batch.of(closure, surface, slope, e, ew, roughness)
+                roughness = np.minimum(parameters["roughness"][points], BY_KEY["roughness"].high)
+                slope, e, ew = (np.ascontiguousarray(parameters[name][points]) for name in ("slope", "e", "ew"))
+                yield Batch.of(closure, surface, slope, e, ew, roughness), points
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,12 +264,3 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
                 continue
             value = getattr(flow, name)
             values[point, k] = KINDS[name].index(value) if name in KINDS else value
-
-
-def _fill_reasons(study: Study, out: Chunk) -> None:
-    """Why there is no flow: what is proved is known of the base of the paper."""
-    none = (out.n_flows == 0) & (out.status == PointStatus.COMPLETE)
-    others = _on_other_bases(study, out.parameters)
-    out.reason[none & others] = Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
-    for closure, surface, points in _groups(study, out.parameters, none & ~others):
-        out.reason[points] = reasons(_batch(closure, surface, out.parameters, points))
