@@ -1,7 +1,7 @@
 """All measurements of speed and memory in one run, beside their targets: python benchmarks/run.py
 
 Times are medians of repeats: of wall time, as the user waits, and of processor time, which other work on the machine
-disturbs less, by which targets are judged, and of which the ratios are taken. The table is printed, and written to
+disturbs less, by which targets are compared, and of which the ratios are taken. The table is printed, and written to
 benchmarks/results/table.txt; it takes a few minutes. What is not installed is left out, and the table says so.
 """
 

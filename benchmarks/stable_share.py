@@ -1,7 +1,7 @@
 """How many of a random sample of flows are stable, and what grows where they are not.
 
 Run as ``python benchmarks/stable_share.py``; about two seconds for each flow. Chutes and surface temperatures are drawn
-with a fixed seed, so that the sample is the same each time; the hottest two flows of each are judged.
+with a fixed seed, so that the sample is the same each time; the hottest two flows of each are examined.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ def drawn(seed: int, draws: int) -> Iterator[Flow]:
     random = np.random.default_rng(seed)
     for _ in range(draws):
         e, ew, roughness = random.uniform(0.6, 0.95), random.uniform(0.5, 0.95), random.uniform(0.5, 0.866)
-        slope, warmth = random.uniform(0.2, 0.55), 10.0 ** random.uniform(-1.0, 1.0)
+        slope, temperature = random.uniform(0.2, 0.55), 10.0 ** random.uniform(-1.0, 1.0)
         slope, e, ew, roughness = (round(float(value), 3) for value in (slope, e, ew, roughness))
-        yield from flows(Chute(slope, e, ew, roughness), T_surface=round(float(warmth), 3))[:2]
+        yield from flows(Chute(slope, e, ew, roughness), T_surface=round(float(temperature), 3))[:2]
 
 
 def kind(flow: Flow) -> str:

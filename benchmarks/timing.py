@@ -18,7 +18,7 @@ class Row:
     """One line: what was measured, ``value`` and ``unit``, ``cpu`` time in ms, and a note.
 
     ``target`` is aimed at, and ``limit`` not to be passed. ``best`` tells whether small or large values are good. A
-    time is judged by the processor time where there is one: on a quiet machine the two are the same.
+    time is compared by the processor time where there is one: on a quiet machine the two are the same.
     """
 
     what: str
@@ -36,10 +36,10 @@ class Row:
             return ""
         limit = self.target if self.limit is None else self.limit
         sign = 1.0 if self.best == "small" else -1.0
-        judged = sign * (self.value if self.cpu is None else self.cpu)
-        if judged <= sign * self.target:
+        compared = sign * (self.value if self.cpu is None else self.cpu)
+        if compared <= sign * self.target:
             return "met"
-        return "within limit" if judged <= sign * limit else "MISSED"
+        return "within limit" if compared <= sign * limit else "MISSED"
 
 
 @dataclass(frozen=True)

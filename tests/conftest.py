@@ -33,6 +33,22 @@ def disturbances(three):
     return {name: Disturbances(flow) for name, flow in three.items()}
 
 
+@pytest.fixture
+def refused(capsys):
+    """Checks that a command refuses its arguments: exit code 2, and one line on standard error alone, which has certain
+    words."""
+    from chuteflow.cli.program import main
+
+    def check(arguments, *words):
+        assert main(list(arguments)) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert len(err.splitlines()) == 1, err
+        assert [word for word in words if word not in err] == [], err
+
+    return check
+
+
 class Served:
     """The command in a process of its own; its address inside the block, and a clean end after it."""
 

@@ -403,6 +403,45 @@ def test_only_the_command_line_prints():
     assert calls == []
 
 
+# The words
+
+#: Words for which numerical analysis and granular physics have their own terms, named in the comments.
+UNUSUAL_WORDS = re.compile(
+    r"\b(?:fans?|born|torn|landscapes?|knots?"  # refined trajectory grid, inserted, unresolved, residual, point
+    r"|climb(?:s|ed|ing)?|summits?|judg(?:e|ed|es|ing)|lanes?"  # maximisation, maximum, examined, batch element or pool
+    r"|grips?|glides?|levers?|paces?|laden|warmth|anew|faces)\b",  # what they are physically; again; cli, io, plotting
+    re.IGNORECASE,
+)
+TEXTS = (".py", ".js", ".html", ".css", ".md", ".ipynb", ".toml")
+
+
+# The change log tells what was renamed.
+@pytest.mark.parametrize("place", ["src", "docs", "benchmarks", "README.md", "CONTRIBUTING.md"])
+def test_no_unusual_words(place):
+    paths = [ROOT / place, *(ROOT / place).rglob("*")]
+    found = [
+        f"{path.relative_to(ROOT)}: {line.strip()[:100]}"
+        for path in sorted(paths)
+        if path.suffix in TEXTS
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if UNUSUAL_WORDS.search(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "is_unusual"),
+    [
+        ("the fan of trajectories", True),
+        ("Born between two", True),
+        ("judge(flow)", True),
+        ("a space, a fanfare", False),
+    ],
+)
+def test_unusual_words_are_seen(line, is_unusual):
+    assert bool(UNUSUAL_WORDS.search(line)) == is_unusual
+
+
 # The files
 
 # Put together here, so that this file does not hold what it looks for.

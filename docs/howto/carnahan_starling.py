@@ -4,11 +4,11 @@ from chuteflow.theory.constitutive import Coefficients, Field, Law
 from chuteflow.theory.lun import table_1
 
 
-def carnahan_starling(nu: Field, room: Field, e: float, slope: float) -> Coefficients:
-    """Table 1 with g0 = (1 - nu/2)/(1 - nu)^3, for which room = 1 - nu. ``slope`` does not enter."""
+def carnahan_starling(nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
+    """Table 1 with g0 = (1 - nu/2)/(1 - nu)^3, for which free_fraction = 1 - nu. ``slope`` does not enter."""
     del slope
-    g0 = (1.0 - 0.5 * nu) / room**3
-    log_slope = 3.0 / room - 0.5 / (1.0 - 0.5 * nu)  # g0'/g0
+    g0 = (1.0 - 0.5 * nu) / free_fraction**3
+    log_slope = 3.0 / free_fraction - 0.5 / (1.0 - 0.5 * nu)  # g0'/g0
     return table_1(nu, g0, log_slope, e)
 
 

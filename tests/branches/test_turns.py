@@ -10,7 +10,7 @@ from chuteflow import Chute, SolveError, curve, flows
 from chuteflow.branches import solution_branches
 from chuteflow.branches.paths import Chord, locate_turning_points
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.rough_turns import find_extrema, may_turn
+from chuteflow.branches.rough_turns import find_extrema
 from chuteflow.branches.solution_branches import trace_branches
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.steady.collocation import LOG_H, LOG_Q, LOG_T
@@ -161,18 +161,6 @@ def test_turns_that_rounding_makes_are_none():
     (branch,) = branches(chute)
     assert np.ptp(branch.macroscopic[-4:, LOG_T]) < 1e-8
     assert locate_turning_points(branch.points[-6:], LOG_T) == []
-
-
-def test_rough_slopes_tell_where_a_quantity_may_turn():
-    place = np.linspace(-1.0, 1.0, 9)
-    # Of s^3 - s^2/100 both turns lie in one step, and the values rise throughout.
-    values = place**3 - 0.01 * place
-    marked = may_turn(np.diff(values) / np.diff(place))
-    assert marked[[3, 4]].all()
-    assert not marked[[0, 1, 6, 7]].any()
-    assert not may_turn(np.diff(np.exp(place)) / np.diff(place)).any()
-    # A step alone tells nothing; one that is missing is no step.
-    assert may_turn(np.array([np.nan, 1.0, np.nan])).tolist() == [False, True, False]
 
 
 def test_a_dip_between_two_points_is_seen_with_its_zeros():

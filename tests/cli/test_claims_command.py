@@ -86,12 +86,8 @@ def test_out_writes_what_would_be_printed(capsys, tmp_path, suffix):
         (["--only", "flow-a", "--only", "flow-b"], "is given 2 times"),
     ],
 )
-def test_bad_input_is_one_line_and_2(capsys, arguments, words):
-    assert run(*arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert words in captured.err
+def test_bad_input_is_one_line_and_2(refused, arguments, words):
+    refused(["claims", *arguments], words)
 
 
 def test_progress_is_shown_on_a_terminal_alone(capsys, monkeypatch):

@@ -113,12 +113,8 @@ def test_factors_too_large_for_a_number_are_printed(capsys):
         ([*chute_arguments(0.3), "--closure", "unheard-of"], "unknown closure"),
     ],
 )
-def test_bad_input_is_one_line_and_2(capsys, arguments, words):
-    assert run(*arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert words in captured.err
+def test_bad_input_is_one_line_and_2(refused, arguments, words):
+    refused(["hot", *arguments], words)
 
 
 def test_what_takes_long_to_import_is_left_out():

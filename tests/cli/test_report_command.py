@@ -189,15 +189,11 @@ def test_a_second_run_takes_nothing_of_the_first(tmp_path):
         (["extra"], "extra"),
     ],
 )
-def test_a_mistake_is_one_line_and_2_and_writes_nothing(arguments, message, tmp_path, monkeypatch, capsys):
+def test_a_mistake_is_one_line_and_2_and_writes_nothing(arguments, message, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     (tmp_path / "taken" / "index.html").mkdir(parents=True)
-    assert main(["report", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert len(captured.err.splitlines()) == 1
-    assert message in captured.err
+    refused(["report", *arguments], message)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "index.html", "taken"]
 
 

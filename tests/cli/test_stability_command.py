@@ -91,17 +91,21 @@ def test_after_a_search_the_text_has_the_verdict_the_threshold_and_what_is_not_k
     assert "kx = 0 and ky = 0" in out
 
 
-def test_the_interface_is_answered_by_the_reason(capsys):
-    code, out, _ = run(capsys, *MATERIAL, "--flux", "3", "--surface", "interface", "--json")
-    assert code == 0
-    flows = json.loads(out)["flows"]
-    assert flows
-    for flow in flows:
-        assert flow["stable"] is None
-        assert flow["mode"] is None
-        assert "use the free surface" in flow["why"]
-    code, out, _ = run(capsys, *MATERIAL, "--flux", "3", "--surface", "interface")
-    assert "not known: stability with the surface 'interface'" in out
+@pytest.mark.parametrize("command", ["stability", "growth", "relax"])
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--surface", "interface"), "free surface"),
+        (("--closure", "garzo-dufty"), "take the Fourier form of the closure"),
+    ],
+)
+def test_where_nothing_can_be_said_of_any_flow_the_chute_is_refused(capsys, command, options, said):
+    code = main([command, *MATERIAL, "--flux", "3", *options])
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert not out
+    assert len(err.splitlines()) == 1
+    assert said in err
 
 
 def test_no_flow_is_an_answer(capsys):

@@ -215,12 +215,8 @@ def test_drawing_sets_nothing_global():
         (["--out", "file/folder"], "cannot make the directory file/folder"),
     ],
 )
-def test_a_mistake_draws_nothing(arguments, message, tmp_path, monkeypatch, capsys):
+def test_a_mistake_draws_nothing(arguments, message, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
-    assert main(["figures", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert len(captured.err.splitlines()) == 1
-    assert message in captured.err
+    refused(["figures", *arguments], message)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

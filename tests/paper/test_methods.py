@@ -273,9 +273,5 @@ def test_flows_out_of_reach_are_said_by_the_command(cut_short, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("command", ["figures", "report"])
-def test_an_unknown_method_is_one_line_and_2(command, capsys):
-    assert main([command, "--method", "shooting"]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert "'overburden', 'mapped'" in captured.err
+def test_an_unknown_method_is_one_line_and_2(command, refused):
+    refused([command, "--method", "shooting"], "'overburden', 'mapped'")

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import chuteflow
-from chuteflow.numerics.chebyshev import grid
+from chuteflow.numerics.chebyshev import split_grid
 from chuteflow.numerics.eigenproblem import refine_eigenvalue
 from chuteflow.stability.base import BaseState, Resolution
 from chuteflow.stability.linear import operator
@@ -31,14 +31,14 @@ def random_flows(seed: int, count: int) -> Iterator[chuteflow.Flow]:
 
 def rational_base(flow: chuteflow.Flow, degree: int, reach: float, crowding: float) -> BaseState:
     """The flow with ln m = -L (1 - s)/(1 + c s), a map of another kind than those of the modes."""
-    g = grid(degree)
+    g = split_grid(np.array([0.0, 1.0]), (degree,))
     below = 1.0 + crowding * g.nodes
     share = np.exp(-reach * (1.0 - g.nodes) / below)
     profile = flow.at_overburden(share)
     rate = share * reach * (1.0 + crowding) / below**2  # dm/ds
     fall = profile.volume_fraction / (flow.mass_holdup * rate)
     return BaseState(
-        flow, Resolution(degree, reach, 0.0), share, profile, -fall[:, None] * g.derivative, g.weights / fall
+        flow, Resolution(degree, reach, 0.0), g, share, profile, -fall[:, None] * g.derivative, g.weights / fall
     )
 
 

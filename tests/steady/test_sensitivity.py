@@ -8,6 +8,7 @@ import pytest
 
 from chuteflow import Chute, Flow, InputError, curve, flows, load, save
 from chuteflow.numerics.complex_step import STEP
+from chuteflow.steady import linearised
 from chuteflow.steady.collocation import LOG_Q
 from chuteflow.steady.free import all_free, free_parameter, varied
 from chuteflow.steady.model import stepped_model
@@ -53,6 +54,34 @@ def test_derivatives_are_those_of_a_complex_step_through_the_solver(name):
         wanted = through_the_solver(flow, parameter, LOG_Q)
         place = [found.logarithmic[n][j] for n in ("mass_flux", "centre_of_mass", "mass_holdup", "surface_temperature")]
         np.testing.assert_allclose(place, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+
+
+def finer(problem, z, parts):
+    """The flow on a grid with so many pieces in the place of each, and its unknowns there."""
+    breaks = np.array(problem.breaks)
+    inner = breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts
+    other = replace(problem, breaks=(*inner.ravel().tolist(), 1.0))
+    nodes = len(problem.grid.nodes)
+    return other, np.concatenate([problem.grid.interpolate(z[:nodes], other.grid.nodes), z[nodes:]])
+
+
+@pytest.mark.parametrize(("closure", "holdup", "parts"), [("garzo-dufty", 1.2, 3), ("extended", 2.0, 6)])
+def test_the_sparse_solution_on_many_pieces_is_that_of_the_dense_matrix(closure, holdup, parts):
+    flow = flows(replace(CHUTE, closure=closure), M=holdup)[0]
+    problem, z = finer(flow.solution.problem, flow.solution.z, parts)
+    state = problem.state(z)
+    assert len(state.g) > linearised._DENSE
+    gradient = state.macroscopic_gradient()
+    border = np.array([0.1, 0.2, 1.0, 0.3]) @ gradient
+    sides = np.zeros((len(z), 2))
+    sides[-1, 0] = 1.0
+    sides[:-1, 1] = -state.residual() + np.sin(np.arange(len(z) - 1.0)) * np.abs(state.jacobian()).max(axis=1)
+    found = linearised.solve_bordered(state, border, sides)
+    wanted = np.linalg.solve(np.concatenate([state.jacobian(), border[None]]), sides)
+    assert np.abs(found - wanted).max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-12 * np.abs(wanted).max())
+    rates = linearised.rates_along_branch(state, gradient)
+    along = gradient @ wanted[:, 0]
+    np.testing.assert_allclose(np.outer(rates, along), np.outer(along, rates), rtol=1e-12, atol=1e-12)
 
 
 def differences(flow, condition, parameter, z, step):

@@ -141,10 +141,13 @@ def test_flows_are_those_of_the_search_of_one_chute(condition, points):
 @pytest.mark.parametrize("condition", VALUES)
 def test_flows_of_several_hundred_chutes_are_those_of_the_search_of_one(condition, seed):
     chunk, more = compare(condition, 200, seed)
-    # A deep flow in a hundred, or one beside the edge of the range, is not seen by the search of one chute.
-    assert more <= 2
-    # So many are searched together that the speed is not that of the search of one.
-    assert chunk.singly <= 20
+    if condition == "T_surface":
+        # A deep flow in a hundred, or one beside the edge of the range, is not seen by the search of one chute.
+        assert more <= 2
+        # So many are searched together that the speed is not that of the search of one.
+        assert chunk.singly <= 20
+    else:
+        assert more == 0
 
 
 def paper_study(condition, values, **results):
@@ -269,7 +272,7 @@ def test_a_chute_that_cannot_be_solved_at_all_is_told(monkeypatch):
         raise SolveError("given up on purpose")
 
     monkeypatch.setattr(engine, "solve_at_temperature", broken_at(0.31))
-    monkeypatch.setattr(engine, "flows_within", given_up)
+    monkeypatch.setattr(engine, "solve_within", given_up)
     chunk = solve_chunk(slopes_study(), 0)
     assert chunk.status.tolist() == [0, 0, 0, PointStatus.FAILED, 0]
     assert chunk.reason[3] == Reason.NO_ANSWER

@@ -94,7 +94,7 @@ def test_points_on_other_bases(path):
     study = read(path)
     assert from_canonical(study.canonical).digest == study.digest
     solved = solve_chunk(study, 0)
-    assert solved.singly >= 4
+    assert solved.singly == study.points
     for i in range(study.points):
         base = bases[int(solved.parameters["base"][i])]
         found = flows(Chute(float(solved.parameters["slope"][i]), 0.8, 0.8, 0.6, base=base), Q=3.0)
@@ -112,7 +112,7 @@ def test_why_there_is_no_flow_is_not_said_by_a_hot_limit_that_is_none(path):
     assert solved.reason[1] == Reason.NONE_FOUND_IN_THE_RANGE_SEARCHED
 
 
-def test_columns_are_not_trusted_where_they_lose_flows_of_moderate_depth():
+def test_two_flows_of_moderate_depth_are_found():
     parameters = {
         "slope": 0.3151755787861835,
         "e": 0.8664500970114325,
@@ -124,13 +124,12 @@ def test_columns_are_not_trusted_where_they_lose_flows_of_moderate_depth():
     assert solved.n_flows.tolist() == [2]
 
 
-def test_a_chunk_all_of_whose_points_wind_is_solved():
+def test_a_chute_on_which_trajectories_wind_is_solved():
     study = from_dict(
         {"parameters": {"slope": [0.42], "e": 0.8, "ew": 0.8, "roughness": 0.6, "Q": 3.0}, "design": {"kind": "list"}},
         Path(),
     )
     solved = solve_chunk(study, 0)
-    assert solved.winding == 1
     assert solved.n_flows.tolist() == [0]
 
 

@@ -62,19 +62,19 @@ def test_viscosity_and_conductivity_are_those_of_j_and_m_as_printed(e):
 def test_length_of_homogeneous_shear(e):
     """Where g2 S^2 = g5/L, the length of Berzi is 1 + (26 (1 - e^2)/15) (nu - 0.49)/(nu_c - nu)."""
     formula, nu = Extended(), np.linspace(0.495, 0.63, 28)
-    room = 1.0 - nu / formula.densest
+    free_fraction = 1.0 - nu / formula.densest
     plain = values(Extended(length="none"), nu, e)
     expected = 1.0 + 26.0 * (1.0 - e**2) / 15.0 * (nu - 0.49) / (formula.densest - nu)
     shear = np.sqrt(nu**2 * plain["dissipation"] / (plain["viscosity"] * expected))
-    got = formula.at_shear(nu, room, e, shear / nu)
+    got = formula.at_shear(nu, free_fraction, e, shear / nu)
     np.testing.assert_allclose(plain["dissipation"] / got.dissipation, expected, rtol=1e-12)
 
 
 def test_length_of_jenkins_and_berzi_is_a_quarter_of_the_cube_root_times_the_shear_rate():
     formula, nu = Extended(radial="torquato", length="jenkins-berzi"), np.linspace(0.5, 0.63, 14)
-    room = 1.0 - nu / formula.densest
+    free_fraction = 1.0 - nu / formula.densest
     plain = values(Extended(radial="torquato", length="none"), nu)
-    got = formula.at_shear(nu, room, 0.8, 9.0 / nu)
+    got = formula.at_shear(nu, free_fraction, 0.8, 9.0 / nu)
     expected = np.maximum(1.0, 0.25 * (nu * plain["radial"]) ** (1 / 3) * 9.0)
     assert expected.min() > 1.0
     np.testing.assert_allclose(plain["dissipation"] / got.dissipation, expected, rtol=1e-13)
@@ -86,10 +86,10 @@ def test_a_flow_down_a_slope_has_the_shear_rate_of_its_stress(name):
     if not chosen.knows_slope:
         pytest.skip("knows no shear rate")
     nu = NU[1:]
-    room = 1.0 - nu / chosen.densest
-    g = chosen.coefficients(nu, room, 0.8, 0.3)
+    free_fraction = 1.0 - nu / chosen.densest
+    g = chosen.coefficients(nu, free_fraction, 0.8, 0.3)
     formula: Any = chosen.coefficients
-    same = formula.at_shear(nu, room, 0.8, 0.3 * g.compressibility / g.viscosity)
+    same = formula.at_shear(nu, free_fraction, 0.8, 0.3 * g.compressibility / g.viscosity)
     np.testing.assert_array_equal(same.dissipation, g.dissipation)
 
 
@@ -180,8 +180,8 @@ def test_derivatives_of_every_law_by_complex_step(name, e):
     nu = rng.uniform(1e-3, 0.6, 300)
     breaks = np.array(chosen.breaks_at(e, 0.3))
     nu = np.concatenate([nu, breaks - 1e-13, breaks + 1e-13])
-    room = 1.0 - nu / chosen.densest
-    exact = chosen.coefficients(nu, room, e, 0.3).compressibility_slope
+    free_fraction = 1.0 - nu / chosen.densest
+    exact = chosen.coefficients(nu, free_fraction, e, 0.3).compressibility_slope
     step = nu + 1j * STEP
     got = chosen.coefficients(step, 1.0 - step / chosen.densest, e, 0.3)
     np.testing.assert_allclose(np.imag(got.compressibility) / STEP, exact, rtol=1e-12)

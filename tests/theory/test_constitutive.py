@@ -47,8 +47,8 @@ def printed(nu, e):
 
 @given(densities, restitutions)
 def test_table_1(nu, e):
-    room = 1.0 - nu / DENSEST
-    g = LUN.coefficients(np.array(nu), np.array(room), e, 0.3)
+    free_fraction = 1.0 - nu / DENSEST
+    g = LUN.coefficients(np.array(nu), np.array(free_fraction), e, 0.3)
     want = printed(nu, e)
     got = {
         "g0": g.radial,
@@ -62,7 +62,7 @@ def test_table_1(nu, e):
     for name, value in got.items():
         assert value == pytest.approx(want[name], rel=1e-12), name
     step = 1e-30
-    complex_g = LUN.coefficients(np.array(nu + 1j * step), np.array(room - 1j * step / DENSEST), e, 0.3)
+    complex_g = LUN.coefficients(np.array(nu + 1j * step), np.array(free_fraction - 1j * step / DENSEST), e, 0.3)
     assert np.imag(complex_g.compressibility) / step == pytest.approx(g.compressibility_slope, rel=1e-12)
 
 
@@ -107,8 +107,8 @@ def test_every_law_is_finite_and_positive_to_the_densest_state(name, e):
 
 
 def test_a_law_that_loses_its_meaning_is_refused():
-    def thin(nu, room, e, slope):
-        g = LUN.coefficients(nu, room, e, slope)
+    def thin(nu, free_fraction, e, slope):
+        g = LUN.coefficients(nu, free_fraction, e, slope)
         return type(g)(**{**vars(g), "viscosity": g.viscosity - 0.1})
 
     with pytest.raises(InputError, match=r"'thin' has no positive g2 at restitution e = 0.8"):

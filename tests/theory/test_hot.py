@@ -483,8 +483,8 @@ def test_interface_conditions_are_refused():
 def test_a_law_without_dilute_limit_is_refused():
     from dataclasses import replace
 
-    def singular(nu, room, e, slope):
-        return replace(LAWS["lun"].coefficients(nu, room, e, slope), density_conductivity=np.full(1, np.inf))
+    def singular(nu, free_fraction, e, slope):
+        return replace(LAWS["lun"].coefficients(nu, free_fraction, e, slope), density_conductivity=np.full(1, np.inf))
 
     with pytest.raises(InputError, match="no dilute limit"):
         dilute(replace(LAWS["lun"], coefficients=singular), 0.8, 0.3)
@@ -504,7 +504,7 @@ def full_flow(model_: HotModel, temperature: float, tolerance: float) -> solver.
     assert exact is not None
     assert model_.mass_holdup is not None
     problem = Collocation(model(model_.chute), 54, 0.0)
-    y = exact.x * problem.share[0]
+    y = exact.x * problem.fraction[0]
     gradient = 2.0 * exact.x * (i1e(y) / i0e(y) if exact.lambda_ > 0.0 else -j1(y) / j0(y))
     z = np.append(gradient, [math.log(temperature), math.log(model_.mass_holdup)])
     start = Elements.of_collocation(problem, z)

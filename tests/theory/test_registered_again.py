@@ -17,8 +17,8 @@ NAME = "own"
 def lossy(factor):
     """Lun's law with the dissipation times ``factor``."""
 
-    def coefficients(nu, room, e, slope):
-        plain = LUN.coefficients(nu, room, e, slope)
+    def coefficients(nu, free_fraction, e, slope):
+        plain = LUN.coefficients(nu, free_fraction, e, slope)
         return replace(plain, dissipation=factor * plain.dissipation)
 
     return replace(LUN, name=NAME, coefficients=coefficients)

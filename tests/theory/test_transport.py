@@ -158,7 +158,7 @@ def test_short_waves_relax_as_the_continuous_spectrum_says(three):
             "T": at.derivative @ np.log(at.profile.granular_temperature),
         }
         kx = 0.5
-        velocity, rate = relaxation_at(flow, at.share)
+        velocity, rate = relaxation_at(flow, at.fraction)
         for node in (2, 8, 15):
             found = []
             for kappa in (1e3, 1e4):

@@ -13,7 +13,7 @@ from chuteflow.branches.solution_branches import explain_incompleteness
 from chuteflow.steady.model import CONDUCTION, COUPLING, LOSS, WORK, model
 from chuteflow.trajectories import kernel
 from chuteflow.trajectories.refining import REFINEMENT, integrate_trajectories
-from chuteflow.trajectories.tables import tables
+from chuteflow.trajectories.tables import BASE, tables
 
 PAPER = Chute(0.3, 0.8, 0.8, 0.6)
 #: Deep flows wind around a state of balance on these.
@@ -96,6 +96,39 @@ def test_trajectories_are_those_of_another_integrator(chute):
         np.testing.assert_allclose(rows[1][same[0], :2], path.y[:, -1], rtol=1e-3, atol=5e-3)
         compared += 1
     assert compared > 2
+
+
+@pytest.mark.parametrize("chute", [PAPER, WINDING[0], Chute(0.2, 0.95, 0.7, 0.7)], ids=str)
+def test_the_expansion_in_the_layer_is_what_another_integrator_gives(chute):
+    problem = model(chute)
+    t = tables(problem)
+    deepest = 0.2 / t.rate
+    base = np.ascontiguousarray(t.values[:, BASE])
+    layer, _ = kernel.expand_in_layer(t.values, base, base, np.log(1e-4), deepest)
+    for temperature in (1e-3, 0.05, 1.0, 1e3):
+        p = 1e-5 * min(temperature, 1.0)
+        above, below = kernel.states_in_layer(t.values, layer, np.array([p, deepest]), np.log(temperature))
+        path = solve_ivp(equations(problem), (p, deepest), above, method="LSODA", rtol=1e-9, atol=1e-13)
+        np.testing.assert_allclose(below, path.y[:, -1], rtol=2e-4, atol=1e-5)
+
+
+def test_no_trajectory_is_near_the_flux_of_the_base_above_where_the_curve_starts():
+    random = np.random.default_rng(7)
+    starts = []
+    for _ in range(12):
+        chute = Chute(*random.uniform((0.15, 0.6, 0.5, 0.5), (0.45, 1.0, 1.0, 0.86)))
+        problem = model(chute)
+        t = tables(problem)
+        deepest, coldest = 0.2 / t.rate, 1e-3
+        base = np.ascontiguousarray(t.values[:, BASE])
+        layer, first = kernel.expand_in_layer(t.values, base, base, np.log(coldest), deepest)
+        starts.append(first / deepest)
+        over = first * np.geomspace(1e-6, 0.999, 40)
+        for temperature in np.geomspace(coldest, 1e5, 60):
+            big_l, y = kernel.states_in_layer(t.values, layer, over, np.log(temperature)).T
+            assert (np.abs(y) < 0.6 * np.abs(base_flux(problem, big_l))).all(), (chute, temperature)
+    assert min(starts) < 0.1
+    assert max(starts) == 1.0
 
 
 @pytest.mark.parametrize("chute", WINDING, ids=str)

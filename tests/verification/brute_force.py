@@ -74,20 +74,20 @@ class Found:
     why: str = ""
 
 
-def closures(nu: np.ndarray, room: np.ndarray, e: float, closure: str) -> tuple[np.ndarray, ...]:
-    """g0, G = g1/nu, g1', g2, g3, g4 and g5/nu^2 of table 1, with ``room`` = 1 - nu/nu*."""
-    g0 = room ** (-2.5 * PACKED)
+def closures(nu: np.ndarray, free_fraction: np.ndarray, e: float, closure: str) -> tuple[np.ndarray, ...]:
+    """g0, G = g1/nu, g1', g2, g3, g4 and g5/nu^2 of table 1, with ``free_fraction`` = 1 - nu/nu*."""
+    g0 = free_fraction ** (-2.5 * PACKED)
     x = nu * g0
     root_pi = math.sqrt(math.pi)
     compression = 1.0 + 2.0 * (1.0 + e) * x
-    g1_slope = compression + 2.0 * (1.0 + e) * x * (1.0 + 2.5 * nu / room)
+    g1_slope = compression + 2.0 * (1.0 + e) * x * (1.0 + 2.5 * nu / free_fraction)
     dense = nu * x * (1.0 + e)
     g2 = (5.0 + 4.0 * (1.0 + e) * x) * (5.0 + 2.0 * (1.0 + e) * (3.0 * e - 1.0) * x)
     g2 = root_pi * g2 / (120.0 * (3.0 - e) * (1.0 + e) * g0) + 4.0 / (5.0 * root_pi) * dense
     g3 = (5.0 + 6.0 * (1.0 + e) * x) * (5.0 + 3.0 * (1.0 + e) ** 2 * (2.0 * e - 1.0) * x)
     g3 = root_pi * g3 / (4.0 * (1.0 + e) * (49.0 - 33.0 * e) * g0) + 2.0 / root_pi * dense
     g4 = 3.0 * root_pi * (5.0 + 6.0 * (1.0 + e) * x) / (4.0 * (49.0 - 33.0 * e)) * e * (1.0 - e)
-    g4 = g4 * (2.0 + 2.5 * nu / room) if closure == "lun" else np.zeros_like(nu)
+    g4 = g4 * (2.0 + 2.5 * nu / free_fraction) if closure == "lun" else np.zeros_like(nu)
     return g0, compression, g1_slope, g2, g3, g4, 12.0 / root_pi * (1.0 - e**2) * g0
 
 
@@ -101,12 +101,12 @@ def functions(chute: Chute, kappa: np.ndarray) -> np.ndarray:
     low, high = np.full_like(kappa, -60.0), np.full_like(kappa, 60.0)
     for _ in range(64):
         middle = 0.5 * (low + high)
-        nu, room = of_logit(middle)
-        above = np.log(nu * (1.0 + 2.0 * (1.0 + chute.e) * nu * room ** (-2.5 * PACKED))) > kappa
+        nu, free_fraction = of_logit(middle)
+        above = np.log(nu * (1.0 + 2.0 * (1.0 + chute.e) * nu * free_fraction ** (-2.5 * PACKED))) > kappa
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    nu, room = of_logit(0.5 * (low + high))
+    nu, free_fraction = of_logit(0.5 * (low + high))
     s, r = chute.slope, chute.r
-    g0, compression, g1_slope, g2, g3, g4, g5 = closures(nu, room, chute.e, chute.closure)
+    g0, compression, g1_slope, g2, g3, g4, g5 = closures(nu, free_fraction, chute.e, chute.closure)
     g1 = nu * compression
     conduction = g3 + g4 * g1 / g1_slope
     lid = math.sqrt(1.0 - r * r)

@@ -76,8 +76,8 @@ def carried(law, e, slope, state, p, end, surface_stress, rtol):
 def base_flux(law, e, slope, wall_restitution, r, nu, diameter=1.0, specularity=None):
     """F1 of (3.16), and F2 of (3.18) over g1, both reduced; or, with a specularity, those of Johnson & Jackson."""
     G, _, g2, *_ = closures(law, nu, e, slope)
-    room = 1.0 - nu / law.densest
-    g0 = float(law.coefficients(np.array([nu]), np.array([room]), e, slope).radial[0])
+    free_fraction = 1.0 - nu / law.densest
+    g0 = float(law.coefficients(np.array([nu]), np.array([free_fraction]), e, slope).radial[0])
     if specularity is not None:
         f1 = slope * G / g0 * 6.0 * 0.62 / (math.pi * math.sqrt(3.0) * specularity)
         return f1, slope * f1 - math.pi * math.sqrt(3.0) / (4.0 * 0.62) * (1.0 - wall_restitution**2) * g0 / G

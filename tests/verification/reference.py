@@ -55,17 +55,17 @@ class Case:
 
 @dataclass
 class Table1:
-    """g_0 to g_5 of table 1 at nu, and dg_1/dnu; ``room`` = 1 - nu/nu*, given apart for its digits."""
+    """g_0 to g_5 of table 1 at nu, and dg_1/dnu; ``free_fraction`` = 1 - nu/nu*, given apart for its digits."""
 
     case: Case
     nu: Any
-    room: Any
+    free_fraction: Any
 
     def __post_init__(self) -> None:
         e, nu = self.case.e, self.nu
         pi = math.pi
-        self.g0 = g0 = self.room ** (-5.0 * NU_STAR / 2.0)
-        self.dg0 = dg0 = 2.5 * g0 / self.room
+        self.g0 = g0 = self.free_fraction ** (-5.0 * NU_STAR / 2.0)
+        self.dg0 = dg0 = 2.5 * g0 / self.free_fraction
         x = nu * g0
         self.g1 = nu * (1.0 + 2.0 * (1.0 + e) * x)
         self.dg1 = 1.0 + 2.0 * (1.0 + e) * (2.0 * x + nu**2 * dg0)
@@ -103,19 +103,19 @@ class Table1:
 
 def densities(logit: Any) -> tuple[Any, Any]:
     """nu and 1 - nu/nu*."""
-    room = 1.0 / (1.0 + np.exp(logit))
-    return NU_STAR / (1.0 + np.exp(-logit)), room
+    free_fraction = 1.0 / (1.0 + np.exp(logit))
+    return NU_STAR / (1.0 + np.exp(-logit)), free_fraction
 
 
 def logit_at(case: Case, p: Any, b: Any) -> Array:
     """The density where g_1(nu) T = p, by Newton's method for ln g_1 from both ends of the range."""
     target = np.log(p) - b
-    # dilute: nu = p/T; dense: g_1 ~ 2 (1 + e) nu*^2 room^(-1.55)
+    # dilute: nu = p/T; dense: g_1 ~ 2 (1 + e) nu*^2 free_fraction^(-1.55)
     dense = (target - math.log(2.0 * (1.0 + case.e) * NU_STAR**2)) / (2.5 * NU_STAR)
     logit = np.where(target < 0.0, target - math.log(NU_STAR), np.maximum(dense, -1.0))
     for _ in range(60):
         g = Table1(case, *densities(logit))
-        step = (target - np.log(g.g1)) / (g.nu * g.dg1 / g.g1 * g.room)
+        step = (target - np.log(g.g1)) / (g.nu * g.dg1 / g.g1 * g.free_fraction)
         logit = logit + np.clip(step, -2.0, 2.0)
         if np.max(np.abs(step)) < 1e-14 * np.max(np.abs(logit)) + 1e-15:
             break
@@ -136,8 +136,8 @@ LOGIT, B, HEAT, DEPTH, LOST, DEPTH_MOMENT, LOST_MOMENT = range(7)
 def derivative(case: Case, log_p: Any, z: Array) -> Array:
     """dz/dln p of the state ``z`` (7, ...): (3.8), (3.9), (3.6) and (3.10) with dp/dz = -nu (3.2)."""
     p, root_t = np.exp(log_p), np.exp(0.5 * z[B])
-    nu, room = densities(z[LOGIT])
-    g = Table1(case, nu, room)
+    nu, free_fraction = densities(z[LOGIT])
+    g = Table1(case, nu, free_fraction)
     t = root_t * root_t
     # (3.6): q/nu = g_3 sqrt(T) T_p - g_4 T^(3/2) nu_p, and (3.8): g_1 T_p + g_1' T nu_p = 1
     t_p = (z[HEAT] / nu + g.g4 * root_t / g.dg1) / (root_t * (g.g3 + g.g4 * g.g1 / g.dg1))
@@ -145,7 +145,7 @@ def derivative(case: Case, log_p: Any, z: Array) -> Array:
     q_p = -((g.g1 * case.slope) ** 2 / g.g2 - g.g5) * t * root_t / nu
     shear = g.g1 * case.slope / g.g2 * root_t
     rates = np.empty_like(z)
-    rates[LOGIT] = nu_p / (nu * room)
+    rates[LOGIT] = nu_p / (nu * free_fraction)
     rates[B] = t_p / t
     rates[HEAT] = q_p
     rates[DEPTH] = 1.0 / nu

@@ -125,9 +125,9 @@ class Problem:
     def _rate(self, log_p, state):
         """d/d ln p of ln x, ln T and y = q/(p sqrt(T))."""
         x = np.exp(state[0])
-        room = 1.0 / (1.0 + x / self.law.densest)
-        nu, p = x * room, np.exp(log_p)
-        g = self.law.coefficients(nu, room, self.e, self.slope)
+        free_fraction = 1.0 / (1.0 + x / self.law.densest)
+        nu, p = x * free_fraction, np.exp(log_p)
+        g = self.law.coefficients(nu, free_fraction, self.e, self.slope)
         G = g.compressibility
         stiff = 1.0 + nu * g.compressibility_slope / G
         flux = g.density_conductivity * nu if g.density_flux is None else g.density_flux
@@ -135,7 +135,7 @@ class Problem:
         by_nu = (g.conductivity - p * state[2] * G) / (stiff * g.conductivity + flux)
         by_T = 1.0 - stiff * by_nu
         net = g.dissipation / G - self.slope**2 * G / g.viscosity
-        return np.stack([by_nu / room, by_T, p * net - state[2] * (1.0 + 0.5 * by_T)])
+        return np.stack([by_nu / free_fraction, by_T, p * net - state[2] * (1.0 + 0.5 * by_T)])
 
     def _base_flux(self, nu):
         out = np.full_like(nu, np.nan)

@@ -1,9 +1,6 @@
 """Every chute and condition there can be, edges included: flows or a reason, within seconds, and nothing else."""
 
 import math
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -12,6 +9,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from chuteflow import Chute, Flow, FlowSet, SolveError, flows
+
+from .limits import TooLate, processor_time
 
 #: Seconds of processor time after which an answer has come too late.
 LIMIT = 20.0
@@ -47,26 +46,6 @@ CONDITIONS = st.one_of(
     st.tuples(st.just("M"), even_in_logarithm(1e-9, 300.0)),
     st.tuples(st.just("T_surface"), even_in_logarithm(1e-6, 1e8)),
 )
-
-
-class TooLate(Exception):
-    """An answer took longer than LIMIT."""
-
-
-@contextmanager
-def limited() -> Iterator[None]:
-    """Raise TooLate in what runs longer than LIMIT."""
-
-    def late(*_: Any) -> None:
-        raise TooLate(f"no answer after {LIMIT:g} s of processor time")
-
-    before = signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, LIMIT)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def ask(chute: Chute, name: str, value: float) -> FlowSet:
@@ -117,7 +96,7 @@ def examine(examples: int) -> None:
     @given(CHUTES, CONDITIONS)
     def there_is_an_answer(chute: Chute, asked: tuple[str, float]) -> None:
         name, value = asked
-        with limited():
+        with processor_time(LIMIT):
             try:
                 found = ask(chute, name, value)
             except SolveError as error:
@@ -155,13 +134,13 @@ EDGES = [
 def test_there_is_an_answer_at_every_corner(name):
     for chute in EDGES:
         for value in (1e-6, 1.0, 300.0 if name == "M" else 1e6):
-            with limited():
+            with processor_time(LIMIT):
                 check_answer(ask(chute, name, value), name, value)
 
 
 def test_a_late_answer_is_noticed(monkeypatch):
     monkeypatch.setattr(f"{__name__}.LIMIT", 0.05)
-    with pytest.raises(TooLate), limited():
+    with pytest.raises(TooLate), processor_time(LIMIT):
         _run_on()
 
 

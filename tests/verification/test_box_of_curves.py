@@ -1,9 +1,6 @@
 """Curves over the whole box of parameters: branches of numbers or a reason, within seconds of processor time."""
 
 import math
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -11,6 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from chuteflow import Chute, curve
+
+from .limits import processor_time
 
 #: Seconds of processor time after which a curve counts as hanging.
 DEADLINE = 20.0
@@ -26,24 +25,8 @@ CHUTES = st.builds(
 )
 
 
-@contextmanager
-def in_time() -> Iterator[None]:
-    """Raise TimeoutError where the body takes longer than DEADLINE."""
-
-    def late(*_: object) -> None:
-        raise TimeoutError(f"no answer after {DEADLINE} s")
-
-    before = signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, DEADLINE)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
-
-
 def check(chute: Chute) -> None:
-    with in_time():
+    with processor_time(DEADLINE):
         found = curve(chute, points=20)
     assert bool(found.reason) != bool(found.branches)
     for branch in found.branches:

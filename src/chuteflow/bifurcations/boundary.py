@@ -15,9 +15,9 @@ from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
 from chuteflow.bifurcations.starting_points import followed
 from chuteflow.bifurcations.system import SecondParameter
-from chuteflow.bifurcations.tracing import CONTROL, TracedBoundary, trace_boundary
+from chuteflow.bifurcations.tracing import CONTROL, BoundaryTracing, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.branches.results import LineOfFlows, Searched
+from chuteflow.branches.results import Searched
 from chuteflow.branches.solution_branches import TracedBranch
 from chuteflow.checks import pair, whole
 from chuteflow.errors import InputError, SolveError
@@ -28,6 +28,7 @@ from chuteflow.progress import told
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.quantities import NUMBERS, PLACE
 from chuteflow.steady.solver import TOLERANCE, checked_tolerance
 from chuteflow.theory.constitutive import require_height
@@ -246,7 +247,7 @@ def boundary(
             inside = within.contains(point.flow.solution.macroscopic)
             if inside and not any(other.holds(point) for other in found):
                 notice = partial(progress, "following", fraction)
-                line = trace_boundary(point, within, tolerance, control, notice)
+                line = trace_boundary(point, BoundaryTracing(within, tolerance, control, notice))
                 # A point that could not be distinguished from those of a known line has led to it again.
                 if not any(line.repeats(other) for other in found):
                     found[:] = [other for other in found if not other.repeats(line)] + [line]

@@ -19,7 +19,7 @@ from chuteflow.steady.quantities import PLACE
 _FRACTION = 0.45
 #: Regions are distinguished on so many cells by as many, and counted if a circle of so many cells fits in.
 _CELLS, _FITTING = 300, 7.0
-#: Room around the boundaries, as a fraction of their extent.
+#: Margin around the boundaries, as a fraction of their extent.
 _MARGIN = 0.03
 #: The vertical axis is logarithmic where its values span a larger factor.
 _SPAN = 30.0

@@ -21,7 +21,7 @@ _PIECE = 24
 _SHORTEST = 1e-5
 #: Pieces shorter than this part of one beside them are joined to it, where no break is pinned between them.
 _SLIVER = 0.2
-#: Pinned breaks are put anew where they have moved by this part of the shorter piece beside them.
+#: Pinned breaks are placed again where they have moved by this part of the shorter piece beside them.
 _MOVED = 0.1
 
 
@@ -124,8 +124,8 @@ def _crossings(problem: Collocation, z: Array) -> list[tuple[float, int]]:
         at, above = r[away], off[away] > 0.0
         for i in np.flatnonzero(above[1:] != above[:-1]).tolist():
             between = [place for place in pinned_at if at[i] <= place <= at[i + 1] and pinned_at[place] == k]
-            share = off[away][i] / (off[away][i] - off[away][i + 1])
-            found.append((between[0] if between else float(at[i] + share * (at[i + 1] - at[i])), k))
+            fraction = off[away][i] / (off[away][i] - off[away][i + 1])
+            found.append((between[0] if between else float(at[i] + fraction * (at[i + 1] - at[i])), k))
     if problem.pins:
         places = np.array([place for place, _ in found])
         moved = places + np.real(z[len(problem.grid.nodes) : -2]) @ problem.shapes_at(places)[0] if found else places

@@ -13,7 +13,7 @@ from chuteflow.bifurcations.conditions import FixedQuantity, InteriorChange, Inv
 from chuteflow.bifurcations.points import BoundaryPoint, solve_boundary_point
 from chuteflow.bifurcations.starting_points import FOLDS, HELD, on_grid_of
 from chuteflow.bifurcations.system import SecondParameter
-from chuteflow.bifurcations.tracing import TracedBoundary, trace_boundary
+from chuteflow.bifurcations.tracing import BoundaryTracing, TracedBoundary, trace_boundary
 from chuteflow.branches.enumeration import flows
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.solution_branches import TracedBranch
@@ -74,7 +74,7 @@ def find_range_edges(found: BoundarySet) -> list[Boundary]:
                 system, w = on_grid_of(sweep, condition, value, solution)
                 point = solve_boundary_point(system, w, HELD, value, found.tolerance)
                 if not any(line.holds(point) for line in lines):
-                    lines.append(trace_boundary(point, wider, found.tolerance))
+                    lines.append(trace_boundary(point, BoundaryTracing(wider, found.tolerance)))
         out += [as_boundary("limit", found.second, line) for line in lines]
     return out
 

@@ -42,8 +42,8 @@ _BEYOND, _BESIDE = 0.02, 1.0
 _HALVINGS = 6
 #: A boundary beside the branches is searched for as far as so many times the distance to go to it.
 _FARTHER = 1.5
-#: A walk there goes by at most this share of the distance at once, so many times, with flows solved to this
-#: tolerance, and ends where so small a share is left.
+#: A walk there goes by at most this fraction of the distance at once, so many times, with flows solved to this
+#: tolerance, and ends where so small a fraction is left.
 _STRIDE, _MOST_STEPS, _ROUGH, _ARRIVED = 0.12, 20, 1e-6, 0.02
 #: Nodes of the grid of a flow at most.
 MOST_NODES = 640
@@ -199,10 +199,10 @@ def _near(
 ) -> BoundaryPoint | None:
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -len(s.problem.grid.nodes))
-    share = 1.0 - sigma if one is last.solution else sigma
+    fraction = 1.0 - sigma if one is last.solution else sigma
     problem, z = pinned(one.problem, one.z)
     moved = carried_to(other.problem, other.z, problem)
-    w = np.append(z + share * (moved - z), value)
+    w = np.append(z + fraction * (moved - z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
         point = solve_boundary_point(system, w, HELD, value, tolerance)

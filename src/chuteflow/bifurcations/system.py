@@ -91,7 +91,7 @@ class BoundarySystem:
     def weights(self) -> Array:
         """Of the unknowns, (n+4,)."""
         problem = self.problem(self.sweep.low)
-        by_quadrature = problem.grid.weights * problem.share[1]
+        by_quadrature = problem.grid.weights * problem.fraction[1]
         return np.concatenate(
             [_OF_GRADIENT * by_quadrature, np.full(len(self.pins), _OF_BREAKS), [1.0, 1.0, self.sweep.weight]]
         )

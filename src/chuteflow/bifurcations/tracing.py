@@ -54,6 +54,17 @@ TURNS = {
 }
 
 
+@dataclass(frozen=True)
+class BoundaryTracing:
+    """How a boundary is followed: the range of its flows, the ``tolerance`` of its points, the ``control`` of the
+    continuation, and ``notice``, which is called at each point."""
+
+    within: SearchRange
+    tolerance: float
+    control: ContinuationSettings = CONTROL
+    notice: Callable[[], object] = lambda: None
+
+
 @dataclass(frozen=True, eq=False)
 class TracedBoundary:
     """A boundary as far as it goes within its range: points in order, turns, and in words why it ends."""
@@ -115,37 +126,24 @@ class TracedBoundary:
         return np.append(point.flow.solution.macroscopic[LOG_M:], np.sqrt(self.sweep.weight) * point.value)
 
 
-def trace_boundary(
-    start: BoundaryPoint,
-    within: SearchRange,
-    tolerance: float,
-    control: ContinuationSettings = CONTROL,
-    notice: Callable[[], object] = lambda: None,
-) -> TracedBoundary:
-    """The boundary through ``start`` to both sides; ``notice`` is called at each point.
+def trace_boundary(start: BoundaryPoint, settings: BoundaryTracing) -> TracedBoundary:
+    """The boundary through ``start`` to both sides.
 
     Raises:
         SolveError: where the start could not be carried on.
     """
     tangent = start.system.tangent(start.w)
-    found = follow_both_sides(lambda sign: _side(start, sign * tangent, within, tolerance, control, notice))
+    found = follow_both_sides(lambda sign: _side(start, sign * tangent, settings))
     return TracedBoundary(start.system.sweep, found.points, found.events, found.ends)
 
 
-def _side(
-    start: BoundaryPoint,
-    tangent: Array,
-    within: SearchRange,
-    tolerance: float,
-    control: ContinuationSettings,
-    notice: Callable[[], object],
-) -> Side[BoundaryPoint]:
+def _side(start: BoundaryPoint, tangent: Array, settings: BoundaryTracing) -> Side[BoundaryPoint]:
     side = Side(start)
     kinked = start.system.problem(start.value).model.kinks.size > 0
     for leaps in range(_LEAPS):
-        lost = _followed(side, start, tangent, within, tolerance, control, notice, closes=leaps == 0)
+        lost = _followed(side, start, tangent, settings, closes=leaps == 0)
         # Just where the flow comes to a break of the law, or leaves it, neither grid serves.
-        leapt = _leapt(side, within, tolerance) if lost and kinked else None
+        leapt = _leapt(side, settings) if lost and kinked else None
         if leapt is None:
             break
         start, tangent = leapt
@@ -154,21 +152,13 @@ def _side(
 
 
 def _followed(
-    side: Side[BoundaryPoint],
-    start: BoundaryPoint,
-    tangent: Array,
-    within: SearchRange,
-    tolerance: float,
-    control: ContinuationSettings,
-    notice: Callable[[], object],
-    *,
-    closes: bool,
+    side: Side[BoundaryPoint], start: BoundaryPoint, tangent: Array, settings: BoundaryTracing, *, closes: bool
 ) -> bool:
     """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to
     the start again."""
     system = start.system
     side.stop("")
-    path = trace(system, start.w, direction=system.weights * tangent, control=control)
+    path = trace(system, start.w, direction=system.weights * tangent, control=settings.control)
     first: list[CurvePoint[BoundarySystem]] = []
     lost: list[bool] = []
 
@@ -178,11 +168,11 @@ def _followed(
         if before is None:
             first.append(point)
             return
-        notice()
+        settings.notice()
         if point.step == 0.0:
             return  # the same point on another grid, or with other borders
         try:
-            _extend(side, first[0] if closes else None, before, point, within, tolerance)
+            _extend(side, first[0] if closes else None, before, point, settings)
         except SolveError:
             # Where neighbours on the boundary are as good as equal, rounding hides where it goes.
             side.stop("it is lost in rounding a little further on")
@@ -195,7 +185,7 @@ def _followed(
     return bool(lost) or path.status.failed
 
 
-def _leapt(side: Side[BoundaryPoint], within: SearchRange, tolerance: float) -> tuple[BoundaryPoint, Array] | None:
+def _leapt(side: Side[BoundaryPoint], settings: BoundaryTracing) -> tuple[BoundaryPoint, Array] | None:
     """A point a little further on than a side leads, and the tangent there, if there is one in about its direction."""
     if len(side.points) < 2:
         return None
@@ -209,11 +199,11 @@ def _leapt(side: Side[BoundaryPoint], within: SearchRange, tolerance: float) -> 
         w = last.w + step * tangent
         row = root**2 * tangent[-3:]
         try:
-            found = solve_boundary_point(system, w, row, float(row @ w[-3:]), tolerance)
+            found = solve_boundary_point(system, w, row, float(row @ w[-3:]), settings.tolerance)
         except SolveError:
             continue
         astray = float(np.linalg.norm(root * (found.w[-3:] - w[-3:])))
-        if astray < _ASTRAY * step and within.contains(found.flow.solution.macroscopic):
+        if astray < _ASTRAY * step and settings.within.contains(found.flow.solution.macroscopic):
             onward = found.system.tangent(found.w)
             return found, onward * np.sign((root**2 * onward[-3:]) @ tangent[-3:])
     return None
@@ -224,15 +214,15 @@ def _extend(
     first: CurvePoint[BoundarySystem] | None,
     before: CurvePoint[BoundarySystem],
     point: CurvePoint[BoundarySystem],
-    within: SearchRange,
-    tolerance: float,
+    settings: BoundaryTracing,
 ) -> None:
     """Add what a step leads to, and stop the side where it leaves the range or closes.
 
     Raises:
-        SolveError: where a point or turning point could not be solved to ``tolerance``.
+        SolveError: where a point or turning point could not be solved to the tolerance.
     """
-    edge = find_exit(before, point, within, tolerance)
+    tolerance = settings.tolerance
+    edge = find_exit(before, point, settings.within, tolerance)
     if edge is not None:
         reached, end = edge
         if reached is not None:

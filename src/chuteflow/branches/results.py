@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import overload
 
 import numpy as np
 
 from chuteflow import display
-from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Compared, Result
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.quantities import NUMBERS, PLACE
 
 
@@ -141,32 +140,6 @@ KINDS = {
     "interior-change": "the interior changes between dissipative, mixed and productive",
     "stability-change": "small disturbances begin to grow, or cease to",
 }
-
-
-class LineOfFlows:
-    """What the ``flows`` of a line, in order, have along it: arrays (k,)."""
-
-    flows: tuple[Flow, ...]
-
-    @cached_property
-    def mass_flux(self) -> Array:
-        """Q along the line."""
-        return np.array([flow.mass_flux for flow in self.flows])
-
-    @cached_property
-    def centre_of_mass(self) -> Array:
-        """h along the line."""
-        return np.array([flow.centre_of_mass for flow in self.flows])
-
-    @cached_property
-    def mass_holdup(self) -> Array:
-        """M along the line."""
-        return np.array([flow.mass_holdup for flow in self.flows])
-
-    @cached_property
-    def surface_temperature(self) -> Array:
-        """T_surface along the line."""
-        return np.array([flow.surface_temperature for flow in self.flows])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Where quantities known at the points of a rough path alone may turn, or pass zero and come back."""
+"""Where quantities that are known at the points of a rough path alone turn, or pass zero and come back."""
 
 from __future__ import annotations
 
@@ -6,24 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.compiled import compiled
-
-
-def may_turn(slope: Array, noise: Array | float = 0.0) -> NDArray[np.bool_]:
-    """Whether a quantity may turn in the steps of a rough path, given its ``slope`` (k, ...) in each by differences,
-    which are known to ``noise``; NaN where a step is missing.
-
-    So it may where the slope changes as much from step to step as it is large: then it, or within the step its own
-    turn, may have reached zero. A step without neighbours tells nothing, and it may turn there.
-    """
-    change = np.abs(np.diff(slope, axis=0))
-    none = np.full_like(slope[:1], np.nan)
-    beside = np.fmax(np.concatenate([none, change]), np.concatenate([change, none]))
-    with np.errstate(invalid="ignore"):
-        return ~(np.abs(slope) > beside + noise) & np.isfinite(slope)
 
 
 @dataclass(frozen=True, eq=False)

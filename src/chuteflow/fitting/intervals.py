@@ -54,8 +54,8 @@ class Interval:
 
     def leaves_out(self, value: float) -> bool:
         """Whether a value is outside by more than the ends are found to."""
-        room = _CLOSE * (self.high - self.low)
-        return not self.low - room <= value <= self.high + room
+        margin = _CLOSE * (self.high - self.low)
+        return not self.low - margin <= value <= self.high + margin
 
     @property
     def open(self) -> bool:
@@ -127,10 +127,10 @@ class _IntervalSide:
             at = float(inside.x[self.which])
             place = at + self.sign * step
             if outside is not None:
-                share = (goal - self._root(inside)) / (outside[1] - self._root(inside))
+                fraction = (goal - self._root(inside)) / (outside[1] - self._root(inside))
                 # Where one end alone comes nearer, the middle.
-                share = 0.5 if closer > 1 else float(np.clip(share, 0.05, 0.95))
-                place = at + share * (outside[0] - at)
+                fraction = 0.5 if closer > 1 else float(np.clip(fraction, 0.05, 0.95))
+                place = at + fraction * (outside[0] - at)
             at_bound = self.sign * (place - bound) >= 0.0
             place = bound if at_bound else place
             if place == at:
@@ -149,9 +149,9 @@ class _IntervalSide:
                     return bound, "bound"
                 before, inside = inside, found
                 closer += 1
-                pace = (root - self._root(before)) / abs(place - at)
+                rate = (root - self._root(before)) / abs(place - at)
                 longest = (_CAREFUL if careful else _BOLD) * abs(place - at)
-                step = min(longest, (1.02 * goal - root) / pace) if pace > 0.0 else longest
+                step = min(longest, (1.02 * goal - root) / rate) if rate > 0.0 else longest
             else:
                 outside, closer = (place, root), 0
             if abs(root - goal) < _CLOSE * goal:

@@ -85,7 +85,7 @@ def csv_rows(answers: Sequence[StabilityAnswer], scales: Scales | None = None) -
     yield list(COLUMNS)
     for answer in answers:
         start = place_object(answer.flow, scales).values()
-        known = None if answer.found is None else answer.found.stable
+        known = answer.found.stable
         stable = "" if known is None else str(known).lower()
         for mode in answer.modes or (None,):
             numbers = {} if mode is None else mode_object(mode, chute=answer.flow.chute, scales=scales)
@@ -98,17 +98,17 @@ def _answer(answer: StabilityAnswer, fields: bool, scales: Scales | None) -> dic
     wave, rate = (factor(name, chute, scales) for name in ("wavenumber", "growth"))
     return {
         **flow_object(answer.flow, scales),
-        "stable": None if found is None else found.stable,
+        "stable": found.stable,
         "mode": modes[0] if modes else None,
         "modes": modes,
         "budget": None if answer.budget is None else budget_object(answer.budget, rate),
-        "grows": None if found is None or found.mode is None else found.grows,
-        "threshold": None if found is None else rate * found.smallest_rate,
-        "wavenumbers": None if found is None else [wave * k for k in found.searched],
-        "complete": False if found is None else found.complete,
-        "examined": 0 if found is None else found.examined,
-        "unresolved": [] if found is None else [{"kx": wave * kx, "ky": wave * ky} for kx, ky in found.unresolved],
-        "why": answer.reason or (None if found is None else why_unknown(found)),
+        "grows": None if found.mode is None else found.grows,
+        "threshold": rate * found.smallest_rate,
+        "wavenumbers": [wave * k for k in found.searched],
+        "complete": found.complete,
+        "examined": found.examined,
+        "unresolved": [{"kx": wave * kx, "ky": wave * ky} for kx, ky in found.unresolved],
+        "why": why_unknown(found),
     }
 
 

@@ -78,7 +78,14 @@ class PiecewiseGrid:
     @cached_property
     def integral(self) -> Array:
         """Matrix (N d + 1, N d + 1) of :meth:`integrate`."""
-        return _of_method(self.integrate, len(self.nodes))
+        matrix, whole_pieces = np.zeros((len(self.nodes),) * 2), np.zeros(len(self.nodes))
+        for columns, block in zip(self.columns, self._widths[..., None] * self.piece.integral, strict=True):
+            rows = columns[1:]
+            matrix[rows] = whole_pieces
+            matrix[np.ix_(rows, columns)] += block[1:]
+            whole_pieces[columns] += block[-1]
+        matrix.setflags(write=False)
+        return matrix
 
     def differentiate(self, values: Array) -> Array:
         """Derivatives at the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""
@@ -115,6 +122,57 @@ class PiecewiseGrid:
         """Values (..., N, d+1) on the pieces as values at the nodes: at a break those of the piece to the left."""
         rest = parts[..., 1:].reshape(*parts.shape[:-2], -1)
         return np.concatenate([parts[..., 0, :1], rest], axis=-1)
+
+
+@dataclass(frozen=True)
+class SplitGrid:
+    """Grids of several degrees, the ``pieces`` between ``breaks`` (N+1,), from 0 to 1: functions may jump at a break,
+    where the two pieces have a node each.
+
+    ``nodes`` (n,), ``derivative`` (n, n) and ``weights`` (n,) as in :class:`Grid`, of the polynomials on the pieces.
+    """
+
+    breaks: Array
+    pieces: tuple[Grid, ...]
+    nodes: Array
+    derivative: Array
+    weights: Array
+
+    @cached_property
+    def firsts(self) -> NDArray[np.intp]:
+        """The first node of each piece, (N,)."""
+        return np.cumsum([0, *(len(piece.nodes) for piece in self.pieces[:-1])])
+
+    @property
+    def nodes_of_pieces(self) -> list[slice]:
+        """The nodes of each piece."""
+        return [
+            slice(int(first), int(first) + len(piece.nodes))
+            for first, piece in zip(self.firsts, self.pieces, strict=True)
+        ]
+
+    def interpolation(self, points: Array) -> Array:
+        """Matrix (m, n) that takes values at the nodes to values at ``points`` (m,) in [0, 1]."""
+        matrix = np.zeros((len(points), len(self.nodes)))
+        index = np.clip(np.searchsorted(self.breaks, points, side="left") - 1, 0, len(self.pieces) - 1)
+        for i, (piece, at) in enumerate(zip(self.pieces, self.nodes_of_pieces, strict=True)):
+            here = np.flatnonzero(index == i)
+            local = (points[here] - self.breaks[i]) / (self.breaks[i + 1] - self.breaks[i])
+            matrix[here, at] = interpolation_matrix(piece, local)
+        return matrix
+
+
+def split_grid(breaks: Array, degrees: tuple[int, ...]) -> SplitGrid:
+    """The grids of ``degrees`` (N,) on the pieces between ``breaks`` (N+1,), which rise from 0 to 1."""
+    pieces = tuple(grid(degree) for degree in degrees)
+    widths = np.diff(breaks)
+    nodes = [low + width * piece.nodes for piece, low, width in zip(pieces, breaks, widths, strict=False)]
+    derivative = np.zeros((sum(map(len, nodes)),) * 2)
+    weights = np.concatenate([width * piece.weights for piece, width in zip(pieces, widths, strict=True)])
+    found = SplitGrid(breaks, pieces, np.concatenate(nodes), derivative, weights)
+    for piece, at, width in zip(pieces, found.nodes_of_pieces, widths, strict=True):
+        derivative[at, at] = piece.derivative / width
+    return found
 
 
 AnyGrid = Grid | PiecewiseGrid

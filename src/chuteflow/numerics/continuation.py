@@ -264,17 +264,17 @@ class _Corrector(Generic[S]):
 
     def _held(self, tangent: Array, before: Array | None) -> int:
         """The component that changes most, or the second if that rises while the first nears a fold."""
-        share = self.metric.root * np.abs(tangent)
-        first = int(share.argmax())
+        fraction = self.metric.root * np.abs(tangent)
+        first = int(fraction.argmax())
         if before is None:
             return first
         share_before = self.metric.root * np.sign(tangent) * before
-        largest = share[first]
+        largest = fraction[first]
         if largest >= share_before[first]:
             return first
-        share[first] = 0.0
-        second = int(share.argmax())
-        return second if share[second] >= max(SECOND * largest, share_before[second]) else first
+        fraction[first] = 0.0
+        second = int(fraction.argmax())
+        return second if fraction[second] >= max(SECOND * largest, share_before[second]) else first
 
     def correct(self, z: Array, row: Array, *, sharp: bool = False) -> _Corrected | ContinuationStatus:
         """The solution of F(z) = 0 in the hyperplane of ``row`` through ``z``, and its tangent, row t > 0.
@@ -503,7 +503,7 @@ class Located(Generic[S]):
 class _Trial(NamedTuple, Generic[S]):
     """A point of the curve, its fraction of the chord that it projects to, and the monitor's value there."""
 
-    share: float
+    fraction: float
     value: float
     point: CurvePoint[S]
 
@@ -546,7 +546,7 @@ def locate(
         bracket = _beyond_the_end(segment, bracket, fine)
     left, right = bracket.left, bracket.right
     best = min(left, right, key=lambda trial: abs(trial.value))
-    width = max(right.share - left.share, 2.0 * fine)
+    width = max(right.fraction - left.fraction, 2.0 * fine)
     # What the slope leaves unexplained is noise.
     noise = max(0.0, (abs(left.value) + abs(right.value)) / abs(bracket.slope) - 2.0 * width)
     error = (width + CAUTION * noise) * segment.speed(best.point)
@@ -555,18 +555,21 @@ def locate(
 
 def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float) -> _Bracket[S]:
     """The bracket of a change of sign, shrunk to twice a ``fine`` fraction of the chord, or to the noise."""
-    start = right.share - left.share
+    start = right.fraction - left.fraction
     slope = (right.value - left.value) / start
     for remaining in range(1 + max(0, math.ceil(math.log2(0.5 * start / fine))), 0, -1):
-        width = right.share - left.share
+        width = right.fraction - left.fraction
         if width <= 2.0 * fine:
             break
         if width > WIDE * start:
             slope = (right.value - left.value) / width
-        share = itp_trial(
-            (left.share, right.share), (left.value, right.value), PUSH / start, fine * 2.0**remaining - 0.5 * width
+        fraction = itp_trial(
+            (left.fraction, right.fraction),
+            (left.value, right.value),
+            PUSH / start,
+            fine * 2.0**remaining - 0.5 * width,
         )
-        trial = segment.trial(min(max(share, left.share + fine), right.share - fine))
+        trial = segment.trial(min(max(fraction, left.fraction + fine), right.fraction - fine))
         if isinstance(trial, ContinuationStatus):
             return _Bracket(left, right, slope, trial)
         outlying = not min(left.value, right.value) <= trial.value <= max(left.value, right.value)
@@ -582,7 +585,7 @@ def _beyond_the_end(segment: _Segment[S], bracket: _Bracket[S], fine: float) -> 
     The tangents of a trace are less exact than those of the trials: where the monitor is nearly zero at an
     end, it may have the wrong sign there, and change it outside.
     """
-    outward, end, inside = (-1.0, 0.0, bracket.right) if bracket.left.share == 0.0 else (1.0, 1.0, bracket.left)
+    outward, end, inside = (-1.0, 0.0, bracket.right) if bracket.left.fraction == 0.0 else (1.0, 1.0, bracket.left)
     reach = fine + 2.0 * abs(inside.value / bracket.slope)
     while reach < FARTHEST:
         outside = segment.trial(end + outward * reach)
@@ -628,19 +631,19 @@ class _Segment(Generic[S]):
         """Arclength per fraction of the chord."""
         return float(self._row @ self._chord / (self._row @ point.tangent))
 
-    def end(self, share: float, point: CurvePoint[S]) -> _Trial[S]:
-        return _Trial(share, self._monitor(point.z, point.tangent, self._corrector.system), point)
+    def end(self, fraction: float, point: CurvePoint[S]) -> _Trial[S]:
+        return _Trial(fraction, self._monitor(point.z, point.tangent, self._corrector.system), point)
 
-    def trial(self, share: float) -> _Trial[S] | ContinuationStatus:
+    def trial(self, fraction: float) -> _Trial[S] | ContinuationStatus:
         metric, a = self._metric, self._a
-        near = _across(self._row, a, self._b, share)
+        near = _across(self._row, a, self._b, fraction)
         corrected = self._corrector.correct(near, self._row, sharp=True)
         if isinstance(corrected, ContinuationStatus):
             return corrected
         arc = metric.arc(a.z, corrected.z, metric.angle(a.tangent, corrected.tangent))
-        step = math.copysign(arc, share)
+        step = math.copysign(arc, fraction)
         point = self._corrector.point(corrected, corrected.tangent, a.arclength + step, step)
-        trial = self.end(share, point)
+        trial = self.end(fraction, point)
         return trial if math.isfinite(trial.value) else ContinuationStatus.LEFT_DOMAIN
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 
@@ -59,6 +60,52 @@ def lobatto(degree: int) -> LobattoGrid:
     for array in (nodes, derivative, weights):
         array.setflags(write=False)
     return LobattoGrid(nodes, derivative, weights)
+
+
+@dataclass(frozen=True)
+class LobattoPieces:
+    """Lobatto's grids on pieces of [0, 1], which share the nodes where they meet.
+
+    ``nodes`` (n,) are those of all pieces, each once; ``at`` (m,) are the nodes of one piece after the other, those
+    that two share twice. ``places`` (m,), ``derivative`` D (m, m) and ``weights`` (m,) are of these: functions may have
+    a corner where pieces meet, so that derivatives are other ones on either side.
+    """
+
+    nodes: Array
+    at: NDArray[np.intp]
+    places: Array
+    derivative: Array
+    weights: Array
+
+    @cached_property
+    def joints(self) -> NDArray[np.intp]:
+        """The places of the last nodes of all pieces but the last, (N-1,)."""
+        return np.flatnonzero(self.at[1:] == self.at[:-1])
+
+    def gathered(self, values: Array) -> Array:
+        """Sums (..., n) over the nodes of values (..., m) of the pieces."""
+        out = np.zeros((*values.shape[:-1], len(self.nodes)), dtype=values.dtype)
+        out[..., self.at] = values
+        out[..., self.at[self.joints]] = values[..., self.joints] + values[..., self.joints + 1]
+        return out
+
+
+@lru_cache(maxsize=16)
+def lobatto_pieces(breaks: tuple[float, ...], degrees: tuple[int, ...]) -> LobattoPieces:
+    """Lobatto's grids of ``degrees`` (N,) on the pieces between ``breaks`` (N+1,), which rise from 0 to 1."""
+    pieces = [lobatto(degree) for degree in degrees]
+    ends = np.cumsum([0, *(degree + 1 for degree in degrees)])
+    places, weights, derivative = np.empty(ends[-1]), np.empty(ends[-1]), np.zeros((ends[-1],) * 2)
+    for i, piece in enumerate(pieces):
+        here, width = slice(ends[i], ends[i + 1]), breaks[i + 1] - breaks[i]
+        places[here] = breaks[i] + width * piece.nodes
+        places[here.stop - 1] = breaks[i + 1]
+        weights[here] = width * piece.weights
+        derivative[here, here] = piece.derivative / width
+    at = np.arange(ends[-1]) - np.repeat(np.arange(len(pieces)), np.diff(ends))
+    kept = np.ones(len(places), dtype=bool)
+    kept[ends[1:-1]] = False
+    return LobattoPieces(places[kept], at, places, derivative, weights)
 
 
 def _last_two(x: Array, n: int) -> tuple[Array, Array]:

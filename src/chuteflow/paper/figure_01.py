@@ -52,13 +52,13 @@ class Figure1:
 
 
 def compute() -> Figure1:
-    """Grains thrown in at random, and kept where there is room and the flow is dense enough."""
+    """Grains at random places that do not overlap, as many as the volume fraction asks for."""
     cold = flows(dissipative(SLOPE), Q=MASS_FLUX)[-1]
     random = np.random.default_rng(1)
-    thrown = np.column_stack([random.uniform(0.0, LENGTH, GRAINS), random.uniform(0.5, HEIGHT, GRAINS)])
-    fraction = cold.profile(thrown[:, 1]).volume_fraction / cold.largest_volume_fraction
+    candidates = np.column_stack([random.uniform(0.0, LENGTH, GRAINS), random.uniform(0.5, HEIGHT, GRAINS)])
+    fraction = cold.profile(candidates[:, 1]).volume_fraction / cold.largest_volume_fraction
     kept: list[Any] = []
-    for place in thrown[random.uniform(0.0, 1.0, GRAINS) < fraction**1.5]:
+    for place in candidates[random.uniform(0.0, 1.0, GRAINS) < fraction**1.5]:
         if not kept or np.hypot(*(np.array(kept) - place).T).min() > NEAREST:
             kept.append(place)
     return Figure1(np.array(kept), cold.profile(ARROWS))

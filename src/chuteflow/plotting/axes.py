@@ -134,7 +134,7 @@ def _family(result: FamilyMap, scales: Scales | None) -> Figure:
 @drawn.register(Stability)
 def _stability(result: Stability, scales: Scales | None) -> Figure:
     modes = () if result.mode is None else (result.mode,)
-    return plot_modes(_alone(result.flow), [StabilityAnswer(result.flow, result, modes, None)], scales=scales)
+    return plot_modes(_alone(result.flow), [StabilityAnswer(result.flow, result, modes)], scales=scales)
 
 
 @drawn.register(HotModel)

@@ -107,13 +107,18 @@ def plot_curve(curve: Curve, *, scales: Scales | None = None) -> Figure:
                     *line(run.flows, pair, curve, scales),
                     **style.LineStyle(colour, style.OF_DENSITY[run.density]).line(),
                 )
-        mark(ax, curve, pair, scales)
-        for axis, name in zip("xy", pair, strict=True):
-            style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
-        style.name_axes(ax, *(style.label(name, scales) for name in pair))
+        frame(ax, curve, pair, scales)
     style.caption(figure, parameters(curve.chute))
     style.legend(figure, handles=[*_key(curve), *key_of_beyond(curve)], loc="outside lower center", ncols=4)
     return figure
+
+
+def frame(ax: Axes, curve: Curve, pair: tuple[str, str], scales: Scales | None) -> None:
+    """Mark the special points of a curve against a ``pair`` of numbers, and scale and name the axes."""
+    mark(ax, curve, pair, scales)
+    for axis, name in zip("xy", pair, strict=True):
+        style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
+    style.name_axes(ax, *(style.label(name, scales) for name in pair))
 
 
 def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:

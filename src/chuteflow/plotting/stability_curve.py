@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from chuteflow.io.stability_curve import LABELS
 from chuteflow.plotting import style
-from chuteflow.plotting.plots import key_of_beyond, key_of_kinds, line, mark, parameters, shade_beyond
+from chuteflow.plotting.plots import frame, key_of_beyond, key_of_kinds, line, parameters, shade_beyond
 from chuteflow.stability.along import STABLE, UNKNOWN, MarkedCurve
 from chuteflow.steady.quantities import Scales
 
@@ -38,10 +38,7 @@ def plot_marked(marked: MarkedCurve, *, scales: Scales | None = None) -> Figure:
         for branch in marked.branches:
             for run in branch.runs:
                 ax.plot(*line(run.flows, pair, curve, scales), **_STROKES[run.label].line())
-        mark(ax, curve, pair, scales)
-        for axis, name in zip("xy", pair, strict=True):
-            style.spread_scale(ax, axis, [getattr(branch, name) for branch in curve.branches])
-        style.name_axes(ax, *(style.label(name, scales) for name in pair))
+        frame(ax, curve, pair, scales)
     style.caption(figure, parameters(curve.chute))
     style.legend(
         figure,

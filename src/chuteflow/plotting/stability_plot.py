@@ -36,8 +36,7 @@ def plot_modes(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Sc
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
-        reasons = [answer.reason for answer in answers if answer.reason]
-        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
+        return _without_modes(flows, answers)
     unit = style.unit("growth", scales)
     length, rate = (factor(name, flows.chute, scales) for name in ("height", "growth"))
     figure, axes = style.panels(2, len(drawn), width=7.2, height=0.5 + 2.7 * len(drawn))
@@ -65,8 +64,7 @@ def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: 
 
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
-        reasons = [answer.reason for answer in answers if answer.reason]
-        return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
+        return _without_modes(flows, answers)
     figure, axes = style.panels(1, len(drawn), width=7.2, height=0.6 + 2.9 * len(drawn))
     names = list(TERMS)
     rate = factor("growth", flows.chute, scales)
@@ -97,6 +95,11 @@ def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: 
     handles, labels = axes[0].get_legend_handles_labels()
     style.legend(figure, handles=handles, labels=labels, loc="outside lower center", ncols=5)
     return figure
+
+
+def _without_modes(flows: FlowSet, answers: Sequence[StabilityAnswer]) -> Figure:
+    reasons = [answer.reason for answer in answers if answer.reason]
+    return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
 
 
 def _profiles(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:

@@ -13,12 +13,11 @@ from chuteflow.steady.flow import Flow
 
 @dataclass(frozen=True, eq=False)
 class StabilityAnswer:
-    """What is known of one flow: its stability and its leading modes, or in ``reason`` why it is not known."""
+    """What is known of one flow: its stability and its leading modes."""
 
     flow: Flow
-    found: Stability | None
+    found: Stability
     modes: tuple[Mode, ...]
-    reason: str | None
 
     @cached_property
     def budget(self) -> ModeBudget | None:

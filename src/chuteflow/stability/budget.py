@@ -123,7 +123,7 @@ class _Disturbed:
             along, across = (FirstOrder(np.zeros_like(f.value), 1j * k * f.slope) for k in (mode.kx, mode.ky))
             return along, across, FirstOrder(base.derivative @ f.value, base.derivative @ f.slope)
 
-        law = grains(base)
+        law = grains(base.flow.chute, base.flow.law)
         velocity = (numbers[ALONG], numbers[ACROSS], numbers[UP])
         moving = motion(Fields(numbers[DENSITY], velocity, numbers[HEAT]), gradient, law)
         T, root_T = exp(numbers[HEAT]), exp(0.5 * numbers[HEAT])

@@ -18,7 +18,7 @@ import numpy as np
 
 from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex
-from chuteflow.stability.base import BaseState, Resolution, shares
+from chuteflow.stability.base import BaseState, Resolution, overburden_fractions
 from chuteflow.steady.flow import Flow
 
 #: Points of the curve for each node of a grid.
@@ -29,7 +29,7 @@ def relaxation(flow_base: BaseState) -> tuple[Array, Array]:
     """u and -Re sigma_c on a grid several times as fine as that of ``flow_base``."""
     resolution = flow_base.resolution
     fine = Resolution(_FINENESS * resolution.degree, resolution.reach, resolution.beta)
-    return relaxation_at(flow_base.flow, shares(grid(fine.degree).nodes, fine)[0])
+    return relaxation_at(flow_base.flow, overburden_fractions(grid(fine.degree).nodes, fine)[0])
 
 
 def relaxation_at(flow: Flow, fraction: Array) -> tuple[Array, Array]:

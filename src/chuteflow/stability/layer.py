@@ -16,6 +16,9 @@ base w = 0, and traction and heat flux are those of the base, (2.9)-(2.15): the 
 eliminated, so that both follow from u, w' and T there. They enter as the boundary terms of the weak form: on
 Lobatto's nodes, where sums integrate by parts exactly, the energy balance holds then for the discrete equations.
 A steady flow has S = 1, w = 0.
+
+Where the steady flow passes breaks of its law, pieces of the grid meet: the weak form sums over both. A flow that moves
+passes them elsewhere, but comes back to there.
 """
 
 from __future__ import annotations
@@ -29,9 +32,10 @@ from numpy.typing import NDArray
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.complex_step import derivative, stepped
-from chuteflow.numerics.legendre import LobattoGrid, lobatto
+from chuteflow.numerics.legendre import LobattoPieces, lobatto_pieces
+from chuteflow.steady import kinks
 from chuteflow.steady.chute import Chute
-from chuteflow.steady.collocation import stretch_map
+from chuteflow.steady.collocation import stretch_map, stretch_position
 from chuteflow.steady.flow import Flow
 from chuteflow.theory import bases
 from chuteflow.theory.constitutive import Coefficients, Law
@@ -40,6 +44,11 @@ from chuteflow.theory.transport import AtBase, Material
 #: Degree of the grid in m.
 DEGREE = 40
 FIELDS = 4
+#: Degree of a piece of the grid: at least, and so much more than its part of the whole. It is not shorter than the
+#: third number.
+_LEAST, _MORE, _SHORTEST = 12, 4, 1e-4
+#: The law at a node where pieces meet is that at densities smaller and larger by this part.
+_BESIDE = 1e-9
 #: Fraction of the mass above the highest node, where fields are those of the far field to rounding.
 _SMALLEST = 1e-250
 #: Densities far above the base fall off to zero.
@@ -80,7 +89,9 @@ class Power:
 
 @dataclass(frozen=True, eq=False)
 class _Forces:
-    """Stresses, heat flux, loss and derivatives at the nodes; those of the base apart."""
+    """tau, stresses, heat flux, loss and derivatives at the nodes of the pieces; those of the base apart."""
+
+    tau: Array
 
     normal: Array
     shear: Array
@@ -97,7 +108,9 @@ class _Forces:
 class Layer:
     """The moving grains of one chute and hold-up, discretised: Lobatto's nodes in m, denser at the surface.
 
-    A state is the vector (4 (degree + 1),) of ln tau, u, w and ln T at the nodes, from the surface to the base.
+    A state is the vector (4 points,) of ln tau, u, w and ln T at the nodes, from the surface to the base. The grid has
+    one more of these than its ``degree``, or somewhat more where it is in pieces, which meet at ``breaks`` (places
+    between 0 and 1), the density rising through them or not (1 or -1 each, ``sides``).
     Two of its values do not move: tau at m = 0, where there is no mass whose motion could change it, and w at
     the base.
     """
@@ -107,6 +120,8 @@ class Layer:
     mass_holdup: float
     stretch: float
     degree: int = DEGREE
+    breaks: tuple[float, ...] = ()
+    sides: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, flow: Flow, degree: int = DEGREE) -> Layer:
@@ -122,11 +137,28 @@ class Layer:
             )
         Material(flow.law, flow.chute.restitution, flow.chute.slope)
         stretch = float(np.log1p(flow.mass_holdup / flow.surface_temperature))
-        return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree)
+        return cls(flow.chute, flow.law, flow.mass_holdup, stretch, degree, *_breaks(flow, stretch))
+
+    @cached_property
+    def _grid(self) -> LobattoPieces:
+        ends = (0.0, *self.breaks, 1.0)
+        if not self.breaks:
+            return lobatto_pieces(ends, (self.degree,))
+        return lobatto_pieces(ends, tuple(max(_LEAST, round(self.degree * w) + _MORE) for w in np.diff(ends).tolist()))
 
     @property
-    def _grid(self) -> LobattoGrid:
-        return lobatto(self.degree)
+    def points(self) -> int:
+        """Number of nodes."""
+        return len(self._grid.nodes)
+
+    @cached_property
+    def _beside(self) -> Array:
+        """Factors of the density at the nodes of the pieces, for the law that holds there."""
+        factors = np.ones(len(self._grid.at))
+        joints, sides = self._grid.joints, np.array(self.sides, dtype=float)
+        factors[joints] -= _BESIDE * sides
+        factors[joints + 1] += _BESIDE * sides
+        return factors
 
     @cached_property
     def mass(self) -> Array:
@@ -136,11 +168,16 @@ class Layer:
     @cached_property
     def weights(self) -> Array:
         """The mass that each node stands for."""
-        return self._grid.weights * self.mass_holdup * stretch_map(self._grid.nodes, self.stretch)[1]
+        return self._grid.gathered(self._weights)
+
+    @cached_property
+    def _weights(self) -> Array:
+        """The mass that each node of the pieces stands for."""
+        return self._grid.weights * self.mass_holdup * stretch_map(self._grid.places, self.stretch)[1]
 
     @cached_property
     def _derivative(self) -> Array:
-        rate = stretch_map(self._grid.nodes, self.stretch)[1]
+        rate = stretch_map(self._grid.places, self.stretch)[1]
         return self._grid.derivative / (self.mass_holdup * rate)[:, None]
 
     @_vanishing
@@ -153,16 +190,16 @@ class Layer:
 
     @_vanishing
     def rate(self, state: Array) -> Array:
-        """d state/dt; ``state`` may be many (..., 4 (degree + 1))."""
-        log_tau, _, _, log_T = self._fields(state)
+        """d state/dt; ``state`` may be many (..., 4 points)."""
+        log_T = self._fields(state)[3]
         f, end = self._forces(state), 1.0 / self.weights[-1]
-        fields = np.empty((*state.shape[:-1], FIELDS, self.degree + 1), dtype=state.dtype)
-        fields[..., 0, :] = -self.mass * f.w_m / np.exp(log_tau)
-        fields[..., 1, :] = self._slope(f.shear) + self.chute.slope
+        fields = np.empty((*state.shape[:-1], FIELDS, self.points), dtype=state.dtype)
+        fields[..., 0, :] = self._mean(-self.mass[self._grid.at] * f.w_m / f.tau)
+        fields[..., 1, :] = self._divergence(f.shear) + self.chute.slope
         fields[..., 1, -1] += end * (f.base_shear - f.shear[..., -1])
-        fields[..., 2, :] = self._slope(f.normal) - 1.0
+        fields[..., 2, :] = self._divergence(f.normal) - 1.0
         fields[..., 2, -1] = 0.0
-        heating = self._slope(f.heat) + f.normal * f.w_m + f.shear * f.u_m - f.loss
+        heating = self._divergence(f.heat) + self._mean(f.normal * f.w_m + f.shear * f.u_m - f.loss)
         heating[..., -1] += end * (f.base_heat - f.heat[..., -1])
         fields[..., 3, :] = heating / (1.5 * np.exp(log_T))
         return fields.reshape(state.shape)
@@ -178,7 +215,7 @@ class Layer:
         Those of the continuous spectrum, on the negative real axis and at its end 0, move with the degree.
         """
         moving = np.ones(len(state), dtype=bool)
-        moving[[0, 3 * (self.degree + 1) - 1]] = False
+        moving[[0, 3 * self.points - 1]] = False
         values = np.linalg.eigvals(self.jacobian(state)[np.ix_(moving, moving)]).astype(complex)
         return values[np.argsort(-np.real(values))]
 
@@ -208,7 +245,7 @@ class Layer:
         f = self._forces(state)
         return Power(
             gravity=self.chute.slope * self.numbers(state)[0],
-            collisions=float(self.weights @ f.loss),
+            collisions=float(self._weights @ f.loss),
             base=float(f.base_loss),
         )
 
@@ -217,14 +254,26 @@ class Layer:
         return tuple(np.moveaxis(state.reshape(*state.shape[:-1], FIELDS, -1), -2, 0))
 
     def _slope(self, values: Array) -> Array:
-        """d values/dm."""
+        """d values/dm at the nodes of the pieces, of values there."""
         return values @ self._derivative.T
 
+    def _mean(self, values: Array) -> Array:
+        """The mean at the nodes, by mass, of values at those of the pieces."""
+        return self._grid.gathered(values * self._weights) / self.weights if self.breaks else values
+
+    def _divergence(self, flux: Array) -> Array:
+        """d flux/dm at the nodes, of a flux at those of the pieces: with what it jumps by where they meet."""
+        out = self._mean(self._slope(flux))
+        joints = self._grid.joints
+        at = self._grid.at[joints]
+        out[..., at] += (flux[..., joints + 1] - flux[..., joints]) / self.weights[at]
+        return out
+
     def _forces(self, state: Array) -> _Forces:
-        log_tau, u, w, log_T = self._fields(state)
-        m = self.mass
+        log_tau, u, w, log_T = (field[..., self._grid.at] for field in self._fields(state))
+        m = self.mass[self._grid.at]
         tau, T, root_T = np.exp(log_tau), np.exp(log_T), np.exp(0.5 * log_T)
-        nu = m / tau
+        nu = m / tau * self._beside
         u_m, w_m, T_m = self._slope(u), self._slope(w), T * self._slope(log_T)
         # sqrt(2 D : D)/(nu sqrt(T)), with d/dz = -nu d/dm
         rate = np.sqrt(u_m**2 + 4.0 / 3.0 * w_m**2) / root_T
@@ -233,6 +282,7 @@ class Layer:
         normal = m * g.compressibility * T / tau + (4.0 / 3.0 * g.viscosity + g.bulk_viscosity) * root_T * nu * w_m
         base = self._at_base(nu[..., -1], u[..., -1], -(nu * w_m)[..., -1], T[..., -1], normal[..., -1])
         return _Forces(
+            tau=tau,
             normal=normal,
             shear=g.viscosity * root_T * nu * u_m,
             heat=nu * root_T * (g.conductivity * T_m - g.density_conductivity * T * nu_m),
@@ -266,3 +316,18 @@ class Layer:
         viscosity = g.viscosity * root_T
         shear = viscosity * along / (viscosity + pull)
         return shear, -shear * u - loss, loss
+
+
+def _breaks(flow: Flow, stretch: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Where a flow passes breaks of its law at which the coefficients are continuous, on a grid of ``stretch``, and
+    whether its density rises downwards there (1) or falls (-1)."""
+    elements = flow.solution.elements
+    if not elements.model.kinks.size or not elements.model.kinks_join:
+        return (), ()
+    share, _ = stretch_map(kinks.crossings(elements), elements.stretch)
+    places = stretch_position(share, stretch)
+    apart = (np.diff(places, prepend=0.0) > _SHORTEST) & (1.0 - places > _SHORTEST)
+    if not apart.any():
+        return (), ()
+    above, below = (flow.at_overburden(share[apart] * side).volume_fraction for side in (1.0 - 1e-4, 1.0 + 1e-4))
+    return tuple(places[apart].tolist()), tuple(np.where(below > above, 1, -1).tolist())

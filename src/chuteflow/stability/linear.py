@@ -19,6 +19,11 @@ k = 0 all this says that stresses and heat flux vanish far above, (2.16).
 A density at all nodes has one degree too many for the velocity: one combination would exert no force, and be a
 false mode at rest. It is left without its value at the top, where it follows from the others; omega takes the
 place of that value among the unknowns.
+
+Where pieces of the grid meet, at a break of the law, velocity, temperature, stresses and heat flux are continuous: all
+coefficients of the law are, and so are the derivatives of the steady velocity, temperature, stresses and heat flux,
+so that it does not matter where the disturbed flow passes the break. The density of each piece is left without its
+first value as above.
 """
 
 from __future__ import annotations
@@ -35,8 +40,9 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.eigenproblem import Complex
 from chuteflow.numerics.first_order import FirstOrder, variables
 from chuteflow.stability.base import BaseState
+from chuteflow.steady.chute import Chute
 from chuteflow.theory import bases
-from chuteflow.theory.constitutive import Coefficients
+from chuteflow.theory.constitutive import Coefficients, Law
 from chuteflow.theory.transport import Fields, Material, Motion, Vector, base_conditions, motion
 
 #: Order of the unknowns n, u, v, w, tau, each at all nodes from the top to the base, with omega for the first n.
@@ -118,22 +124,21 @@ def steady_motion(base: BaseState) -> Motion:
     def gradient(f: Any) -> Vector:
         return (0.0 * f, 0.0 * f, base.derivative @ f)
 
-    return motion(_steady(base), gradient, grains(base))
+    return motion(_steady(base), gradient, grains(base.flow.chute, base.flow.law))
 
 
-def grains(base: BaseState) -> Material:
-    """The law of the chute.
+def grains(chute: Chute, law: Law) -> Material:
+    """The grains of disturbed flows on ``chute``, with its ``law``.
 
     Raises:
         InputError: for a law that is known for steady flows alone, and for the interface condition.
     """
-    chute = base.flow.chute
     if chute.surface != "free":
         raise InputError(
             f"stability with the surface {chute.surface!r}: its conditions are known for a steady, level interface "
             "alone, and say nothing of one that is tilted, moves or takes up grains: use the free surface"
         )
-    return Material(base.flow.law, chute.restitution, chute.slope)
+    return Material(law, chute.restitution, chute.slope)
 
 
 def operator(base: BaseState) -> Operator:
@@ -169,7 +174,7 @@ def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
         return along, across, FirstOrder(base.derivative @ f.value, base.derivative @ f.slope)
 
     fields = Fields(numbers[DENSITY], (numbers[ALONG], numbers[ACROSS], numbers[UP]), numbers[HEAT])
-    moving = motion(fields, gradient, grains(base))
+    moving = motion(fields, gradient, grains(base.flow.chute, base.flow.law))
     matrix = np.concatenate([force.slope for force in moving.forces]).astype(complex)
     weights = np.concatenate([np.ones(base.points), *(inertia.value for inertia in moving.inertia[1:])])
     chute = base.flow.chute
@@ -181,15 +186,34 @@ def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
         matrix[first], matrix[last] = above.slope[0], below.slope[-1]
         weights[[first, last]] = 0.0
     _add_load(base, matrix, kx, ky)
+    _join_pieces(base, matrix, weights, ceiling)
     return matrix, weights
 
 
 def without_top(base: BaseState) -> Array:
-    """Matrix that puts for the nodal value at the top what the polynomial through all others has there."""
+    """Matrix that puts for the first nodal value of each piece what the polynomial through its others has there."""
     matrix = np.eye(base.points)
-    matrix[0] = -base.grid.barycentric / base.grid.barycentric[0]
-    matrix[0, 0] = 0.0
+    for piece, nodes in zip(base.grid.pieces, base.grid.nodes_of_pieces, strict=True):
+        first = nodes.start
+        matrix[first, nodes] = -piece.barycentric / piece.barycentric[0]
+        matrix[first, first] = 0.0
     return matrix
+
+
+def _join_pieces(base: BaseState, matrix: Complex, weights: Array, fluxes: tuple[FirstOrder, ...]) -> None:
+    """Continuous velocity, temperature, stresses and heat flux where pieces of the grid meet; ``fluxes`` are those of
+    ALONG, ACROSS, UP and HEAT."""
+    for right in base.grid.firsts[1:].tolist():
+        for field, flux in zip((ALONG, ACROSS, UP, HEAT), fluxes, strict=True):
+            above, below = field * base.points + right - 1, field * base.points + right
+            matrix[above] = flux.slope[right - 1] - flux.slope[right]
+            matrix[below] = 0.0
+            matrix[below, [above, below]] = -1.0, 1.0
+            weights[[above, below]] = 0.0
+        # The first value of a density follows from the others, and is none of the unknowns.
+        matrix[right] = 0.0
+        matrix[right, right] = 1.0
+        weights[right] = 0.0
 
 
 def _add_load(base: BaseState, matrix: Complex, kx: float, ky: float) -> None:

@@ -20,10 +20,10 @@ import numpy as np
 from chuteflow import display
 from chuteflow.checks import real
 from chuteflow.errors import InputError, SolveError
-from chuteflow.numerics.chebyshev import Array, grid, interpolation_matrix
+from chuteflow.numerics.chebyshev import Array, grid
 from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue, spectrum
 from chuteflow.result import Compared
-from chuteflow.stability.base import BaseState, Resolution, base, shares
+from chuteflow.stability.base import BESIDE, BaseState, Resolution, base, overburden_fractions
 from chuteflow.stability.essential import distance, relaxation
 from chuteflow.stability.linear import ALONG, DENSITY, FIELDS, Operator, operator, without_top
 from chuteflow.steady.flow import Flow
@@ -134,9 +134,8 @@ class Mode(Compared):
         """Heights (points,) from the base up, and the fields there, (5, points): as smooth as they are."""
         base_ = self.operator.base
         s = grid(points - 1).nodes[::-1]
-        fraction, _ = shares(s, base_.resolution)
-        matrix = interpolation_matrix(base_.grid, s)
-        return self.flow.at_overburden(fraction).height, self.fields @ matrix.T
+        fraction, _ = overburden_fractions(s, base_.resolution)
+        return self.flow.at_overburden(fraction).height, self.fields @ base_.grid.interpolation(s).T
 
 
 def relative_fields(of: Operator, vector: Complex) -> Complex:
@@ -245,7 +244,7 @@ class Disturbances:
         if error > _DRIFT * away or density_tail(of, vector[:, None])[0] > _TAIL:
             return None, error / away
         # Rounding leaves this much of a rate, whatever the grids say.
-        noise = 1e-14 * (1.0 + abs(sigma))
+        noise = (BESIDE if len(of.base.grid.pieces) > 1 else 1e-14) * (1.0 + abs(sigma))
         return Mode(self.flow, kx, ky, sigma, float(max(error, noise)), of, vector), error / away
 
     def followed(self, kx: float, ky: float, near: complex, level: int = 0) -> Mode | None:
@@ -318,8 +317,12 @@ def smallest_rate(flow: Flow) -> float:
 def density_tail(of: Operator, vectors: Complex) -> Array:
     """Relative size of the last sixth of the Chebyshev coefficients of the density of each of ``vectors``."""
     density = without_top(of.base) @ vectors[: of.points]
-    coefficients = np.abs(of.base.grid.to_coefficients @ density)
-    return coefficients[-(of.points // 6) :].max(axis=0) / coefficients.max(axis=0)
+    last, largest = np.zeros(vectors.shape[1]), np.zeros(vectors.shape[1])
+    for piece, nodes in zip(of.base.grid.pieces, of.base.grid.nodes_of_pieces, strict=True):
+        coefficients = np.abs(piece.to_coefficients @ density[nodes])
+        last = np.maximum(last, coefficients[-(len(coefficients) // 6) :].max(axis=0))
+        largest = np.maximum(largest, coefficients.max(axis=0))
+    return last / largest
 
 
 def check_wavenumbers(kx: float, ky: float) -> None:

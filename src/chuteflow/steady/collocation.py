@@ -89,7 +89,7 @@ class Collocation:
         return grid(self.degree) if self.breaks == WHOLE else piecewise_grid(self.breaks, self.degree)
 
     @cached_property
-    def share(self) -> tuple[Array, Array]:
+    def fraction(self) -> tuple[Array, Array]:
         """m and dm/ds at the nodes."""
         return stretch_map(self.grid.nodes, self.stretch)
 
@@ -116,7 +116,7 @@ class Collocation:
         return self._integral_over_mass()
 
     def _integral_over_mass(self) -> Array:
-        return self.grid.integral * self.share[1][..., None, :]
+        return self.grid.integral * self.fraction[1][..., None, :]
 
     @property
     def pinned_nodes(self) -> NDArray[np.intp]:
@@ -151,7 +151,7 @@ class Collocation:
         if same and self.breaks == WHOLE:
             return Collocation(self.model, degree, self.stretch), refinement(self.degree, degree)
         other = Collocation(self.model, degree, self.stretch if stretch is None else stretch, self.breaks)
-        position = stretch_position(other.share[0], self.stretch)
+        position = stretch_position(other.fraction[0], self.stretch)
         return other, interpolation_matrix(self.grid, position)
 
 
@@ -174,7 +174,7 @@ class State:
         nodes = len(problem.grid.nodes)
         self.g = z[..., :nodes]
         self.mass = mass = np.exp(z[..., -1:])
-        self.share = m, dm = self._moved(z[nodes:-2]) if problem.pins else problem.share
+        self.fraction = m, dm = self._moved(z[nodes:-2]) if problem.pins else problem.fraction
         self.theta = z[..., -2:-1] + problem.grid.integrate(self.g * dm)
         self.overburden = mass * m
         self.p = p = self.overburden + model.surface_stress
@@ -196,7 +196,7 @@ class State:
     @property
     def accumulate(self) -> Array:
         """Matrix (n+1, n+1) that takes g to theta less its surface value."""
-        return self.problem.grid.integral * self.share[1] if self.problem.pins else self.problem.accumulate
+        return self.problem.grid.integral * self.fraction[1] if self.problem.pins else self.problem.accumulate
 
     def _moved(self, d: Array) -> tuple[Array, Array]:
         """m and dm/dr at the nodes where the pinned breaks are moved by ``d`` (k,)."""
@@ -217,7 +217,7 @@ class State:
     def by_pins(self) -> tuple[Array, Array, Array]:
         """Derivatives (n+1, k) with respect to the unknowns of the pinned breaks: of ln P, ln dm/dr, and theta."""
         problem = self.problem
-        (shape, slope), (m, dm) = problem.shapes, self.share
+        (shape, slope), (m, dm) = problem.shapes, self.fraction
         alpha = max(float(np.reshape(problem.stretch, ())), _PLAIN)
         whole = np.expm1(alpha)
         m_s = alpha * (m + 1.0 / whole)
@@ -353,11 +353,11 @@ class State:
             integrand = self.overburden_fraction * np.exp(self.theta - self.f[DENSITY])
         else:
             integrand = self.overburden * np.exp(-np.log(np.maximum(self.x, _LEAST)) - self.f[DENSITY])
-        return self.problem.height_weights * self.share[1] * self.mass * integrand
+        return self.problem.height_weights * self.fraction[1] * self.mass * integrand
 
     @cached_property
     def _shear_flux_per_work(self) -> Array:
-        weights = self.problem.grid.weights * self.share[1] * self.mass
+        weights = self.problem.grid.weights * self.fraction[1] * self.mass
         return weights * self.overburden * (self.problem.model.slope * np.exp(0.5 * self.log_t))
 
     @cached_property

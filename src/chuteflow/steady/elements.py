@@ -30,7 +30,7 @@ _ROUGHLY = 1e-6
 #: Where none does: the degree of a grid on each piece, of so many elements.
 _PIECE, _PER_PIECE = 24, 6
 #: Ends of elements in the first one, in parts of it, where T has no limit at the surface.
-_GRADED = 0.4 ** np.arange(12, 0, -1.0)
+_GRADED = 0.4 ** np.arange(8, 0, -1.0)
 #: Ends of pieces of a grid there, in parts of the first of the others, which are not smaller than the second number.
 _COARSE, _SMOOTH = 0.125 ** np.arange(8, 0, -1.0), 1e-3
 #: A piece of a grid is not shorter than this.
@@ -149,7 +149,7 @@ class Elements:
         """The unknowns on a Chebyshev grid of the same stretch, and y at its nodes."""
         theta, y = self.at(problem.grid.nodes).T
         mass = np.exp(self.log_mass)
-        p = mass * problem.share[0] + self.model.surface_stress
+        p = mass * problem.fraction[0] + self.model.surface_stress
         f, _ = self.model.closures(self.model.density_argument(p, theta))
         return np.concatenate([mass * y / f[CONDUCTION], [theta[0], self.log_mass]]), y
 
@@ -179,19 +179,12 @@ class Elements:
         """What integrals are taken with, see :func:`_rule`."""
         return _rule(self.model.beta if self.model.unlimited else 0.0)
 
-    @property
-    def inner_places(self) -> Array:
-        """The ends of the grid, and the Gauss points of all elements between them, ascending."""
-        s = kernel.places(self.breaks, _GAUSS[0])
-        inner = s[np.arange(len(s)) % (STAGES + 1) != 0]
-        return np.concatenate([s[:1], inner, s[-1:]])
-
     def crossings(self, levels: Array, close: float) -> Array:
         """The places, to ``close``, at which ln x passes one of the ``levels`` (k,)."""
         model = self.model
         found = kernel.crossings(
-            self.breaks, self.ends, self.slopes, _CARDINAL, self.stretch, float(np.exp(self.log_mass)),
-            model.surface_stress, float(np.real(model.beta)), self.inner_places, levels, close,
+            self.breaks, self.ends, self.slopes, _CARDINAL, _GAUSS[0], _INTEGRALS, self.stretch,
+            float(np.exp(self.log_mass)), model.surface_stress, float(np.real(model.beta)), levels, close,
         )  # fmt: skip
         return np.asarray(found, dtype=float)
 

@@ -42,7 +42,7 @@ _MOST_POINTS = 1_000_000
 _vanishing = np.errstate(under="ignore")
 #: Samples of an element, its ends among them.
 _WITHIN_ELEMENT = np.linspace(0.0, 1.0, 7)[:-1]
-#: Share P/M of the overburden above the highest point that is distinguished from the far field.
+#: Fraction P/M of the overburden above the highest point that is distinguished from the far field.
 _SMALLEST_SHARE = 1e-260
 
 
@@ -278,8 +278,10 @@ class Flow(Result):
         chosen = self.law
         nu = _density(state.x, state.f)
         # Rounding does not let grains be packed to the last.
-        room = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
-        contacts = nu * chosen.called(chosen.coefficients, nu, room, self.chute.restitution, self.chute.slope).radial
+        free_fraction = np.maximum(1.0 - nu / chosen.densest, np.finfo(float).eps)
+        contacts = (
+            nu * chosen.called(chosen.coefficients, nu, free_fraction, self.chute.restitution, self.chute.slope).radial
+        )
         per_grain = problem.grid.weights / state.s_p / state.mass
         largest = self.largest_volume_fraction
         return Validity(
@@ -550,7 +552,7 @@ def _samples_of(state: State) -> dict[str, Array]:
     fine = replace(problem, degree=max(_SAMPLES // (len(problem.breaks) - 1), 2 * problem.degree))
     nodal = np.stack([_density(state.x, state.f), state.rise, state.net_loss])
     nu, rise, net = problem.grid.interpolate(nodal, fine.grid.nodes)
-    return {"share": fine.share[0], "nu": nu, "rise": rise, "net": net}
+    return {"share": fine.fraction[0], "nu": nu, "rise": rise, "net": net}
 
 
 def _density(x: Array, f: Array) -> Array:

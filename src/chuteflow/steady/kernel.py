@@ -574,18 +574,29 @@ def log_argument(
 
 @compiled
 def crossings(
-    breaks: Any, ends: Any, slopes: Any, cardinal: Any, stretch: float, mass: float, p_s: float, beta: float,
-    samples: Any, kinks: Any, close: float,
+    breaks: Any, ends: Any, slopes: Any, cardinal: Any, points: Any, integrals: Any, stretch: float, mass: float,
+    p_s: float, beta: float, kinks: Any, close: float,
 ) -> Any:  # fmt: skip
     """The places at which ln x passes one of the ``kinks``, to ``close``, by false position with the Illinois rule
-    between neighbouring ``samples`` (k,) of which one is above."""
-    count = len(samples)
-    at = np.empty((count, 2))
-    evaluate(breaks, ends, slopes, cardinal, samples, at)
-    level = np.empty(count)
+    between neighbours of which one is above: the ends of the grid, and the Gauss ``points`` (STAGES,) of all elements
+    between them."""
+    count = len(slopes) * STAGES + 2
+    samples, level = np.empty(count), np.empty(count)
+    samples[0], samples[count - 1] = breaks[0], breaks[-1]
+    level[0], level[count - 1] = ends[0, 0], ends[-1, 0]
+    i = 1
+    for e in range(len(slopes)):
+        h = breaks[e + 1] - breaks[e]
+        for j in range(STAGES):
+            samples[i] = breaks[e] + h * points[j]
+            level[i] = ends[e, 0]
+            for k in range(STAGES):
+                level[i] += h * integrals[j, k] * slopes[e, k, 0]
+            i += 1
+    whole = math.expm1(stretch)
     for i in range(count):
-        p = mass * math.expm1(stretch * samples[i]) / math.expm1(stretch) + p_s
-        level[i] = (1.0 + beta) * math.log(max(p, 1e-300)) - at[i, 0]
+        p = mass * math.expm1(stretch * samples[i]) / whole + p_s
+        level[i] = (1.0 + beta) * math.log(max(p, 1e-300)) - level[i]
     found = []
     for kink in kinks:
         for i in range(count - 1):

@@ -34,7 +34,8 @@ def crossings(flow: Elements) -> Array:
     if not kinks.size:
         return kinks
     # The ends of elements that meet a break already are on neither side of it.
-    return np.unique(flow.crossings(kinks, 0.1 * MEETS))
+    found = flow.crossings(kinks, 0.1 * MEETS)
+    return np.unique(found) if found.size > 1 else found
 
 
 def distance(flow: Elements, places: Array) -> float:
@@ -46,6 +47,8 @@ def distance(flow: Elements, places: Array) -> float:
 
 def with_ends(flow: Elements, places: Array) -> Elements:
     """The polynomials of ``flow`` on elements of which some end at ``places``."""
+    if not places.size:
+        return flow
     breaks: list[float] = flow.breaks.tolist()
     wanted = places.tolist()
     for place in wanted:

@@ -77,17 +77,17 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
         log_ratio = density.values(closure_coordinate(scaled_breaks))[0]
         breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
     nodes = _nodes(tuple(breaks_of_x.tolist()))
-    ratio = _invert(density, nodes.argument)  # of room-scaled density to x
+    ratio = _invert(density, nodes.argument)  # of density scaled by the free fraction to x
     scaled = nodes.argument * np.exp(ratio)
     r = reduce(chosen, scaled, e, slope)
-    log_room = -np.log1p(scaled * (1.0 / chosen.densest))
+    log_free_fraction = -np.log1p(scaled * (1.0 / chosen.densest))
     k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
     if np.all(b == 0.0):
         gamma = density.values(closure_coordinate(scaled))[1]
     else:
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
-        gamma = -(ratio + log_room + np.log(r.compressibility))
-    values = [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + log_room, gamma]
+        gamma = -(ratio + log_free_fraction + np.log(r.compressibility))
+    values = [r.conduction * (1.0 - b), k, r.loss, r.work, *on.functions(r), ratio + log_free_fraction, gamma]
     return nodes.pieces.table(np.stack(values, axis=-1))
 
 
@@ -121,12 +121,12 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: tuple[fl
     ``breaks`` are places where the law is not smooth."""
     nodes = _nodes(breaks)
     r = reduce(chosen, nodes.argument, e, slope)
-    room = 1.0 / (1.0 + nodes.argument / chosen.densest)
-    rate = r.coupling * room**2  # dGamma/dscaled
+    free_fraction = 1.0 / (1.0 + nodes.argument / chosen.densest)
+    rate = r.coupling * free_fraction**2  # dGamma/dscaled
     gamma = antiderivative(nodes.pieces.table((rate * nodes.by_coordinate)[:, None]))
     (big_gamma,) = gamma.values(nodes.pieces.x)
-    log_g, log_room = np.log(r.compressibility), np.log(room)
-    log_ratio = log_room + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
+    log_g, log_free_fraction = np.log(r.compressibility), np.log(free_fraction)
+    log_ratio = log_free_fraction + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
     return nodes.pieces.table(np.stack([log_ratio, big_gamma], axis=-1))
 
 

@@ -1,7 +1,7 @@
 """How a flow answers to small changes of its parameters: exact derivatives by the implicit function theorem.
 
 # notation: z unknowns of a flow (n+3,), F(z, lambda) = 0 (n+2,) the discretised steady problem, m(z, lambda) = (ln Q,
-# ln h, ln M, ln T_surface), t unit tangent of the branch in the space of m, share = P/M of the overburden.
+# ln h, ln M, ln T_surface), t unit tangent of the branch in the space of m, P/M fraction of the overburden.
 
 The flows of one chute are a branch. Beside a flow, F_z dz + F_lambda dlambda = 0 has one solution along the branch, and
 one for each parameter, once that is made unique. It is taken across the branch, t . dm = 0: this is finite everywhere,
@@ -33,6 +33,7 @@ from chuteflow.parameters import CONDITIONS
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, stretch_position
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, all_free, free_parameter
+from chuteflow.steady.linearised import rates_along_branch, solve_bordered
 from chuteflow.steady.model import Model, stepped_model
 from chuteflow.steady.quantities import FIELDS, NUMBERS
 from chuteflow.steady.solver import Solution
@@ -167,7 +168,7 @@ class _ReferenceFlow:
         state, problem = flow._state, flow.solution.problem
         matrix = interpolation_matrix(problem.grid, stretch_position(fraction, problem.stretch))
         theta, g = matrix @ state.theta, matrix @ state.g
-        bend = matrix @ (problem.grid.derivative @ state.g / problem.share[1])
+        bend = matrix @ (problem.grid.derivative @ state.g / problem.fraction[1])
         mass = state.mass[0]
         p = mass * fraction + flow._model.surface_stress
         local = flow._local(*flow._pointwise(stepped(p, mass), stepped(theta, g), stepped(g, bend)))
@@ -360,8 +361,8 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     free = tuple(one if isinstance(one, FreeParameter) else free_parameter(chute, one) for one in asked)
     condition = _condition(at)
     problem, z, state = flow.solution.problem, flow.solution.z, flow.solution.state
-    jacobian, gradient = state.jacobian(), state.macroscopic_gradient()
-    weights = _transversal(flow, jacobian, gradient)
+    gradient = state.macroscopic_gradient()
+    weights = _transversal(flow, gradient)
     beyond = [stepped_model(chute, parameter.model_name) for parameter in free]
     states = [replace(problem, model=one).state(z) for one in beyond]
     sides = np.zeros((len(z), 1 + len(free)))
@@ -369,7 +370,7 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     for j, one in enumerate(states):
         sides[:-1, 1 + j] = -derivative(one.residual())
         sides[-1, 1 + j] = -weights @ derivative(one.macroscopic())
-    found: Any = np.linalg.solve(np.concatenate([jacobian, (weights @ gradient)[None]]), sides)
+    found = solve_bordered(state, weights @ gradient, sides)
     length = float(np.linalg.norm(gradient @ found[:, 0]))
     ahead: Array = found[:, 0] / length
     tangent = gradient @ ahead
@@ -383,12 +384,11 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     return Sensitivity(flow, free, condition, tangent, across, tuple(moved))
 
 
-def _transversal(flow: Flow, jacobian: Array, gradient: Array) -> Array:
+def _transversal(flow: Flow, gradient: Array) -> Array:
     """Weights (4,) of the quantities such that their sum changes along the branch."""
     rates = flow.solution.rates
-    if rates is None:
-        # A flow that was loaded: the null vector of its Jacobian.
-        rates = gradient @ np.linalg.svd(jacobian)[2][-1]
+    if rates is None:  # a flow that was loaded
+        rates = rates_along_branch(flow.solution.state, gradient)
     return rates / np.linalg.norm(rates)
 
 

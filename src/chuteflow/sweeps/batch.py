@@ -132,14 +132,14 @@ class Pointwise:
         x = np.exp(log_x)
         # Laws are functions of every state by itself, and so of every restitution.
         r = reduce(batch.law, x, cast(Any, batch.restitution), cast(Any, batch.slope))
-        room = 1.0 / (1.0 + x * (1.0 / batch.law.densest))
+        free_fraction = 1.0 / (1.0 + x * (1.0 / batch.law.densest))
         self._batch, self._reduced = batch, r
         self.p, self.log_x, self.y = p, log_x, y
-        self.nu = x * room
+        self.nu = x * free_fraction
         coupled = r.drift
         stiff = r.stiffness + coupled
         self.coupling = coupled / stiff
-        self.log_x_rate = 1.0 / (stiff * room)  # dL/dln x
+        self.log_x_rate = 1.0 / (stiff * free_fraction)  # dL/dln x
         self.conduction = r.conduction
         self.net = r.loss - batch.slope**2 * r.work
         self.v = p * y / r.conduction

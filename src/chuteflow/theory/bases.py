@@ -38,7 +38,7 @@ class BaseCondition:
         """The two functions of the density in which F1 and the loss are affine."""
 
     @abstractmethod
-    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+    def where_empty(self, radial: float, wall_shear: float) -> tuple[float, float]:
         """These two where the density vanishes, of g0 and A g1/g2 there."""
 
     @abstractmethod
@@ -100,10 +100,10 @@ class Richman(BaseCondition):
         """g1/g2 and A g1/g2, with A of (2.12) for grains and hemispheres of one size."""
         return reduced.shear, reduced.wall_shear
 
-    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+    def where_empty(self, radial: float, wall_shear: float) -> tuple[float, float]:
         """g1/g2 vanishes."""
         del radial
-        return 0.0, grip
+        return 0.0, wall_shear
 
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:
         """F1 of (3.16): with dbar = (1 + diameter)/2 for the diameter d before the shear rate in (2.10), and in A."""
@@ -169,9 +169,9 @@ class JohnsonJackson(BaseCondition):
         """G/g0 and g0/G."""
         return reduced.compressibility / reduced.radial, reduced.radial / reduced.compressibility
 
-    def where_empty(self, radial: float, grip: float) -> tuple[float, float]:
+    def where_empty(self, radial: float, wall_shear: float) -> tuple[float, float]:
         """G is 1."""
-        del grip
+        del wall_shear
         return 1.0 / radial, radial
 
     def slip(self, first: Field, second: Field, roughness: float, slope: float) -> Field:

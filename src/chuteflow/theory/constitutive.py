@@ -68,7 +68,7 @@ class Unknown:
 
     name: str
 
-    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+    def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """Nothing.
 
         Raises:
@@ -84,8 +84,8 @@ class Unknown:
 class Law:
     """A constitutive law.
 
-    ``coefficients(nu, room, e, slope)`` takes nu and ``room`` = 1 - nu/nu* apart, so that no digit is lost
-    near the densest packing nu* = ``densest``, where the radial distribution function diverges. It is a plain
+    ``coefficients(nu, free_fraction, e, slope)`` takes nu and ``free_fraction`` = 1 - nu/nu* apart, so that no digit is
+    lost near the densest packing nu* = ``densest``, where the radial distribution function diverges. It is a plain
     function, or a frozen dataclass whose fields are the parameters of the law, see
     :class:`chuteflow.theory.formula.Formula`: laws with equal values of them are equal.
     ``knows_slope`` is for laws whose dissipation depends on the shear rate, which in a fully developed flow
@@ -93,7 +93,7 @@ class Law:
     a function of e and the slope that gives them; ``valid`` is where the law was meant to hold, in words; ``spec`` is
     the text by which it was requested, where that was not its name, see :mod:`chuteflow.theory.laws`.
 
-    ``coefficients`` may have methods of its own: ``breaks(e, slope)``, and ``at_shear(nu, room, e, rate)``, the
+    ``coefficients`` may have methods: ``breaks(e, slope)``, and ``at_shear(nu, free_fraction, e, rate)``, the
     coefficients where the shear rate over nu sqrt(T) is ``rate``, for disturbed flows of a law that ``knows_slope``.
     """
 
@@ -202,9 +202,9 @@ class Law:
         Raises:
             InputError: where the law's function fails, naming it and the densities.
         """
-        room = 1.0 / (1.0 + x / self.densest)
-        nu = x * room
-        return nu, room, self.called(self.coefficients, nu, room, e, slope)
+        free_fraction = 1.0 / (1.0 + x / self.densest)
+        nu = x * free_fraction
+        return nu, free_fraction, self.called(self.coefficients, nu, free_fraction, e, slope)
 
     def of_density(self, nu: Field, e: float, slope: float, rate: Field | None = None) -> Coefficients:
         """The coefficients at ``nu``; of a law that ``knows_slope`` where the shear rate over nu sqrt(T) is ``rate``,
@@ -213,14 +213,14 @@ class Law:
         Raises:
             InputError: where the law's function fails, naming it and the densities.
         """
-        room = 1.0 - nu / self.densest
+        free_fraction = 1.0 - nu / self.densest
         if rate is None or not self.knows_slope:
-            return self.called(self.coefficients, nu, room, e, slope)
+            return self.called(self.coefficients, nu, free_fraction, e, slope)
         formula: Any = self.coefficients
-        return self.called(formula.at_shear, nu, room, e, rate)
+        return self.called(formula.at_shear, nu, free_fraction, e, rate)
 
     def called(self, function: Callable[..., Coefficients], nu: Field, *others: Any) -> Coefficients:
-        """What a ``function`` of the law gives at ``nu`` and the ``others``: room, e, and slope or rate.
+        """What a ``function`` of the law gives at ``nu`` and the ``others``: free_fraction, e, and slope or rate.
 
         Raises:
             InputError: where it fails, naming it and the densities.

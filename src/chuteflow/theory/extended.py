@@ -47,14 +47,14 @@ class Extended(Formula):
         if self.length not in LENGTHS:
             raise InputError(f"unknown length {shown(self.length)}: choose one of {', '.join(LENGTHS)}")
 
-    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+    def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """The coefficients in a fully developed flow down ``slope``."""
-        plain = self._without_length(nu, room, e)
-        return self._shortened(plain, nu, room, e, slope * plain.compressibility / plain.viscosity)
+        plain = self._without_length(nu, free_fraction, e)
+        return self._shortened(plain, nu, free_fraction, e, slope * plain.compressibility / plain.viscosity)
 
-    def at_shear(self, nu: Field, room: Field, e: float, rate: Field) -> Coefficients:
+    def at_shear(self, nu: Field, free_fraction: Field, e: float, rate: Field) -> Coefficients:
         """The coefficients where the shear rate over nu sqrt(T) is ``rate`` = S/nu, whatever the flow."""
-        return self._shortened(self._without_length(nu, room, e), nu, room, e, rate)
+        return self._shortened(self._without_length(nu, free_fraction, e), nu, free_fraction, e, rate)
 
     def breaks(self, e: float, slope: float) -> tuple[float, ...]:
         """Those of the radial function, and where the length becomes 1 or takes another form."""
@@ -63,10 +63,10 @@ class Extended(Formula):
             return tuple(sorted(points))
 
         def excess(scaled: Any) -> Any:
-            room = 1.0 / (1.0 + scaled / self.densest)
-            nu = scaled * room
-            plain = self._without_length(nu, room, e)
-            return self._length(plain, nu, room, e, slope * plain.compressibility / plain.viscosity) - 1.0
+            free_fraction = 1.0 / (1.0 + scaled / self.densest)
+            nu = scaled * free_fraction
+            plain = self._without_length(nu, free_fraction, e)
+            return self._length(plain, nu, free_fraction, e, slope * plain.compressibility / plain.viscosity) - 1.0
 
         at = crossings(excess(_SCALED), _SCALED, excess)
         points |= {x / (1.0 + x / self.densest) for x in at}
@@ -84,8 +84,8 @@ class Extended(Formula):
         """The length accounts for clusters and chains: up to the densest packing."""
         return super().dense_limit if self.length == "none" else self.densest
 
-    def _without_length(self, nu: Field, room: Field, e: float) -> Coefficients:
-        g0, log_slope = self.radial_at(nu, room)
+    def _without_length(self, nu: Field, free_fraction: Field, e: float) -> Coefficients:
+        g0, log_slope = self.radial_at(nu, free_fraction)
         x = nu * g0
         f, lost = 1.0 + e, 1.0 - e
         # J nu X and M nu X are finite at nu = 0.
@@ -106,14 +106,14 @@ class Extended(Formula):
             bulk_viscosity=4.0 / (3.0 * _ROOT_PI) * f * nu * x,
         )
 
-    def _shortened(self, plain: Coefficients, nu: Field, room: Field, e: float, rate: Field) -> Coefficients:
+    def _shortened(self, plain: Coefficients, nu: Field, free_fraction: Field, e: float, rate: Field) -> Coefficients:
         """``plain`` with its dissipation over max(1, L); ``rate`` is S/nu."""
         if self.length == "none":
             return plain
-        length = self._length(plain, nu, room, e, rate)
+        length = self._length(plain, nu, free_fraction, e, rate)
         return replace(plain, dissipation=plain.dissipation / np.where(np.real(length) > 1.0, length, 1.0))
 
-    def _length(self, plain: Coefficients, nu: Field, room: Field, e: float, rate: Field) -> Field:
+    def _length(self, plain: Coefficients, nu: Field, free_fraction: Field, e: float, rate: Field) -> Field:
         """L without its lower bound 1."""
         if self.length == "jenkins-berzi":
             # No cube root of zero, whose derivative is infinite: the length is 0 there.
@@ -125,7 +125,7 @@ class Extended(Formula):
         # J = (5 sqrt(pi)/8) g2/(nu^2 g0), so that sqrt(J) S is finite at nu = 0.
         j = 5.0 * _ROOT_PI / 8.0 * plain.viscosity / plain.radial
         lost = 1.0 - self.loss_restitution(e) ** 2
-        left = self.densest * room
+        left = self.densest * free_fraction
         beyond = np.where(np.real(nu) > FREEZING, (nu - FREEZING) / left, 0.0)
         # Elastic grains lose nothing over whatever length.
         with np.errstate(divide="ignore"):

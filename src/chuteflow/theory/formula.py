@@ -1,6 +1,6 @@
 """Laws with parameters: a frozen dataclass whose fields are the parameters, and which is called for the coefficients.
 
-# notation: nu volume fraction, room = 1 - nu/nu*, nu* densest packing, e restitution.
+# notation: nu volume fraction, free_fraction = 1 - nu/nu*, nu* densest packing, e restitution.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Formula:
             )
 
     @abstractmethod
-    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+    def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """The coefficients at ``nu``, see :class:`chuteflow.theory.constitutive.Law`."""
 
     @property
@@ -75,9 +75,9 @@ class Formula:
         """The volume fraction up to which the law is meant: above, grains form clusters and chains."""
         return CLUSTERED
 
-    def radial_at(self, nu: Field, room: Field) -> tuple[Field, Field]:
+    def radial_at(self, nu: Field, free_fraction: Field) -> tuple[Field, Field]:
         """g0 and g0'/g0."""
-        return self._radial.function(nu, room, self.densest)
+        return self._radial.function(nu, free_fraction, self.densest)
 
     def loss_restitution(self, e: Any) -> Any:
         """The restitution in the dissipation, with friction.

@@ -37,10 +37,10 @@ class GarzoDufty(Formula):
         """Whether there are no breaks, nor a flux that grows like 1/nu where dilute."""
         return super().smooth and self.fourier
 
-    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+    def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """The coefficients; ``slope`` does not enter."""
         del slope
-        g0, log_slope = self.radial_at(nu, room)
+        g0, log_slope = self.radial_at(nu, free_fraction)
         x = nu * g0
         x_slope = g0 * (1.0 + nu * log_slope)
         f, lost = 1.0 + e, 1.0 - e

@@ -26,10 +26,10 @@ class Lun(Formula):
 
     fourier: bool = False
 
-    def __call__(self, nu: Field, room: Field, e: float, slope: float) -> Coefficients:
+    def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """Table 1 as the paper has it; ``slope`` does not enter."""
         del slope
-        full = table_1(nu, *self.radial_at(nu, room), e)
+        full = table_1(nu, *self.radial_at(nu, free_fraction), e)
         if self.friction:
             full = replace(full, dissipation=12.0 / _ROOT_PI * (1.0 - self.loss_restitution(e) ** 2) * full.radial)
         if self.fourier:

@@ -272,10 +272,10 @@ class _SimulationProgress:
         if now - self._told < (_OFTEN if self._line.is_shown else _SELDOM) or moment.step == self._first:
             return
         self._told = now
-        pace = (moment.step - self._first) / max(now - self._begin, 1e-9)
-        left = (moment.last - moment.step) / max(pace, 1e-9)
+        rate = (moment.step - self._first) / max(now - self._begin, 1e-9)
+        left = (moment.last - moment.step) / max(rate, 1e-9)
         text = (
-            f"t = {moment.time:.0f}, step {moment.step} of {moment.last}: {pace:.0f} steps a second, {left:.0f} s left"
+            f"t = {moment.time:.0f}, step {moment.step} of {moment.last}: {rate:.0f} steps a second, {left:.0f} s left"
         )
         if self._line.is_shown:
             self._line.show(text)

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 _EPILOG = (
     "A flow is stable if no discrete mode with a wavenumber from 1e-3/h to 10/h grows faster than 1e-6 "
     "sqrt(g cos(theta)/h). With --kx and --ky one wave is examined, which says nothing of the others. Rates are in "
-    "sqrt(g cos(theta)/d), wavenumbers in 1/d, speeds in sqrt(g d cos(theta)). Where stability is not defined or "
-    "not resolved, the output says so, and its numbers are null.\n\n"
+    "sqrt(g cos(theta)/d), wavenumbers in 1/d, speeds in sqrt(g d cos(theta)). Where stability is not resolved, the "
+    "output says so, and its numbers are null.\n\n"
     "Example: chuteflow stability --slope 0.3 --e 0.8 --ew 0.8 --roughness 0.6 --flux 3"
 )
 _SAVED = (".csv", ".json")
@@ -71,8 +71,11 @@ def command(**given: Any) -> None:
         for path in options.picture_files(given["budget"]):
             require_writable(path, options.DRAWN)
     from chuteflow.branches.enumeration import flows
+    from chuteflow.stability.linear import grains
     from chuteflow.stability.modes import check_wavenumbers
 
+    # What could be said of no flow of the chute is refused before any is solved.
+    grains(chute, chute.law)
     check_wavenumbers(*(0.0 if k is None else k for k in (kx, ky)))
     found = flows(chute, **condition, **search)
     near, lines = ({}, []) if len(found) else options.nearest(given, chute, condition, scales)
@@ -103,16 +106,13 @@ def _answer(flow: Flow, kx: float | None, ky: float | None, count: int) -> Stabi
     from chuteflow.stability.answers import StabilityAnswer
     from chuteflow.stability.result import leading_modes, stability_of
 
-    try:
-        stability = stability_of(flow, kx=kx, ky=ky)
-    except InputError as error:
-        return StabilityAnswer(flow, None, (), str(error))
+    stability = stability_of(flow, kx=kx, ky=ky)
     modes = () if stability.mode is None else (stability.mode,)
     if count > 1 and stability.mode is not None:
         # What leads at these wavenumbers may be unresolved, though this mode is known.
         with suppress(SolveError):
             modes = leading_modes(flow, stability.mode.kx, stability.mode.ky, count=count)
-    return StabilityAnswer(flow, stability, tuple(modes), None)
+    return StabilityAnswer(flow, stability, tuple(modes))
 
 
 def _save(found: FlowSet, answers: Sequence[StabilityAnswer], scales: Scales | None, path: str) -> None:
@@ -173,7 +173,7 @@ def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: 
     chute = answer.flow.chute
     wave, rate, speed_unit = (factor(name, chute, scales) for name in ("wavenumber", "growth", "wave_speed"))
     start = [number, *tables.numbers(answer.flow, columns, chute, scales)]
-    state = _STATES[None if answer.found is None else answer.found.stable]
+    state = _STATES[answer.found.stable]
     if not answer.modes:
         yield [*start, state, *("-" for _ in range(6))]
     for i, mode in enumerate(answer.modes):
@@ -184,8 +184,6 @@ def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: 
 
 
 def _said(answer: StabilityAnswer, scales: Scales | None) -> str:
-    if answer.found is None:
-        return f"not known: {answer.reason}"
     found, said = answer.found, _DisturbanceFormat(answer.flow.chute, scales)
     return _of_all(found, said) if found.complete else _of_some(found, said)
 

@@ -118,7 +118,7 @@ export function draw(svg, { x: across, y: up, areas = [], points: measured = [],
   const x = drawable(across), y = drawable(up);
   const { width, height } = sizeOf(svg);
   const levels = ticks(y, Math.max(2, (height - 46) / 44));
-  // Room for the numbers, of some 6.6 pixels a digit, and for what they are of.
+  // Space for the numbers, of some 6.6 pixels a digit, and for the label.
   const digits = y.bare ? 0 : Math.max(...levels.map((v) => number(v, 3).length));
   const box = { l: Math.round(digits * 6.6) + (y.label ? 28 : 12), r: width - 10, t: 10, b: height - 36 };
   const sx = scale(x, box.l, box.r), sy = scale(y, box.b, box.t);

@@ -18,6 +18,7 @@ from chuteflow.numerics.continuation import ContinuationSettings, CurvePoint, Mo
 from chuteflow.numerics.following import Side, follow_both_sides, follow_side
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow
+from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.mapped.solution import DEGREES, LARGEST_DEGREE, MappedSolution, MappedSystem, refine, solve_mapped
 from chuteflow.steady.solver import Condition, SolverStatus
 
@@ -45,7 +46,7 @@ class MappedPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class MappedCurve:
+class MappedCurve(LineOfFlows):
     """A branch of flows in order along its curve, from hot to cold at the start.
 
     All are converged to TOLERANCE. ``special`` are the flows of turning mass flux and at the onset of a density
@@ -60,26 +61,6 @@ class MappedCurve:
     def folds(self) -> tuple[MappedSolution, ...]:
         """The flows of turning mass flux."""
         return tuple(point.flow for point in self.special if point.kind == "fold-Q")
-
-    @property
-    def mass_flux(self) -> Array:
-        """Q along the curve, (3.26)."""
-        return np.array([flow.mass_flux for flow in self.flows])
-
-    @property
-    def centre_of_mass(self) -> Array:
-        """h along the curve, (3.27)."""
-        return np.array([flow.centre_of_mass for flow in self.flows])
-
-    @property
-    def mass_holdup(self) -> Array:
-        """M along the curve, (3.27)."""
-        return np.array([flow.mass_holdup for flow in self.flows])
-
-    @property
-    def surface_temperature(self) -> Array:
-        """T_surface along the curve."""
-        return np.array([flow.surface_temperature for flow in self.flows])
 
 
 def mapped_curve(
