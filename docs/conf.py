@@ -29,6 +29,7 @@ extensions = [
     "profiles",
     "present",
     "offline",
+    "accessible",
 ]
 if "quick" not in tags:  # noqa: F821, Sphinx gives it
     extensions.append("sphinx.ext.viewcode")

@@ -3,6 +3,7 @@
 import shutil
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -85,6 +86,54 @@ def test_every_page_of_the_site(tab, quick_site):
 @pytest.mark.slow
 def test_every_page_of_the_whole_site(tab, whole_site):
     assert_sound(tab, whole_site)
+
+
+#: Levels of WCAG, and a rule that is left out: Sphinx nests the lists of arguments in its reference otherwise.
+ACCESSIBLE = {
+    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"],
+    "rules": {"definition-list": {"enabled": False}},
+}
+
+
+def violations(tab):
+    """Rules of WCAG AA that the page breaks, each with its first element."""
+    found = Axe().run(tab, options=ACCESSIBLE).response["violations"]
+    return [f"{one['id']}: {one['nodes'][0]['html'][:100]}" for one in found]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_keeps_the_rules_of_wcag(tab, quick_site, scheme):
+    tab.emulate_media(color_scheme=scheme)
+    tab.goto((quick_site / "howto" / "units.html").as_uri())
+    assert violations(tab) == []
+
+
+@pytest.mark.slow
+def test_every_page_keeps_the_rules_of_wcag(tab, whole_site):
+    tab.emulate_media(color_scheme="light")
+    found = {}
+    for path in sorted(whole_site.rglob("*.html")):
+        tab.goto(path.as_uri())
+        found[str(path.relative_to(whole_site))] = violations(tab)
+    assert {page: what for page, what in found.items() if what} == {}
+
+
+@pytest.mark.parametrize(
+    ("content", "rule"),
+    [
+        ("<p>a page</p>", None),
+        ("<p style='color: #999; background: #fff'>faint</p>", "color-contrast"),
+        ("<input type='text'>", "label"),
+        ("<button></button>", "button-name"),
+        ("<img src='data:,'>", "image-alt"),
+    ],
+)
+def test_a_broken_rule_is_seen(tab, tmp_path, content, rule):
+    page = tmp_path / "page.html"
+    page.write_text(f"<!doctype html><html lang=en><title>x</title><main>{content}</main></html>", encoding="utf-8")
+    tab.goto(page.as_uri())
+    found = [one.partition(":")[0] for one in violations(tab)]
+    assert found == ([] if rule is None else [rule])
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect, sync_playwright
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -581,6 +582,14 @@ def test_contrast_of_text_and_colours(page, theme):
     })"""
     )
     assert set(used) <= set(known)
+
+
+@pytest.mark.parametrize("query", ["?theme=light", "?theme=dark&si=1&surface=interface"])
+def test_the_page_keeps_the_rules_of_wcag(page, query):
+    opened(page, query)
+    page.locator("#pin").click()
+    broken = Axe().run(page).response["violations"]
+    assert [f"{one['id']}: {one['nodes'][0]['html'][:100]}" for one in broken] == []
 
 
 @pytest.mark.parametrize("query", ["", "?si=1&surface=interface&against=T_surface&slope=0.31"])

@@ -31,7 +31,9 @@ def sample_heights(sample: OverburdenSampler, own: float, top: float, tolerance:
     that, and no height has to be looked for.
     """
     heights = sample(_SCOUTS)[0]
-    ends = [_SCOUTS[np.flatnonzero(np.append(heights[:-1] >= height, True))[0]] for height in (min(own, top), top)]
+    ends = [
+        float(_SCOUTS[np.flatnonzero(np.append(heights[:-1] >= height, True))[0]]) for height in (min(own, top), top)
+    ]
     parts = (np.linspace(0.0, ends[0], _AT_FIRST + 1), np.log(np.linspace(1.0, np.exp(ends[0]), _AT_FIRST + 1)))
     places = np.unique(np.concatenate([*parts, np.linspace(ends[0], ends[1], _AT_FIRST // 2)]))[::-1]
     found = sample(places)
