@@ -197,7 +197,11 @@ def local_problem(flow, at, node, kx, kappa, gradients, steady):
             FirstOrder(rise, 1j * kappa * f.slope),
         )
 
-    moving = motion(Fields(numbers[0], (numbers[1], numbers[2], numbers[3]), numbers[4]), gradient, grains(at))
+    moving = motion(
+        Fields(numbers[0], (numbers[1], numbers[2], numbers[3]), numbers[4]),
+        gradient,
+        grains(at.flow.chute, at.flow.law),
+    )
     a = np.concatenate([force.slope for force in moving.forces])
     b = np.array([1.0, *(np.asarray(i.value).item() for i in moving.inertia[1:])])
     return a, b

@@ -98,7 +98,8 @@ def evaluate_zeros(grid: TrajectoryGrid, extremes: Array) -> Zeros:
         model.table.compiled, model.constants, grid.overburden, grid.states, grid.first, grid.zeros, extremes,
         1.0 / grid.scale, _APART * grid.refinement.delta,
     )  # fmt: skip
-    return Zeros(grid, *found, bounds, doubt, scattered)
+    log_q, log_m, log_t, rise = found
+    return Zeros(grid, log_q, log_m, log_t, rise, bounds, doubt, scattered)
 
 
 @compiled
@@ -295,6 +296,7 @@ def _through_four(
     values = np.zeros((4, 5))
     even = around[0] >= low and around[3] <= high
     labels, distance = np.empty(4), np.empty(3)
+    inner = 0.0
     if even:
         _label(states, around, per_flux, labels, distance)
         inner = labels[2] - labels[1]

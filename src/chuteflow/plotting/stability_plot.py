@@ -36,7 +36,7 @@ def plot_modes(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: Sc
     """The leading mode of each flow, one row each: moduli of its fields against height, and a section."""
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
-        return _without_modes(flows, answers)
+        return _without_modes(flows)
     unit = style.unit("growth", scales)
     length, rate = (factor(name, flows.chute, scales) for name in ("height", "growth"))
     figure, axes = style.panels(2, len(drawn), width=7.2, height=0.5 + 2.7 * len(drawn))
@@ -64,7 +64,7 @@ def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: 
 
     drawn = [answer for answer in answers if answer.modes]
     if not drawn:
-        return _without_modes(flows, answers)
+        return _without_modes(flows)
     figure, axes = style.panels(1, len(drawn), width=7.2, height=0.6 + 2.9 * len(drawn))
     names = list(TERMS)
     rate = factor("growth", flows.chute, scales)
@@ -97,9 +97,8 @@ def plot_budgets(flows: FlowSet, answers: Sequence[StabilityAnswer], *, scales: 
     return figure
 
 
-def _without_modes(flows: FlowSet, answers: Sequence[StabilityAnswer]) -> Figure:
-    reasons = [answer.reason for answer in answers if answer.reason]
-    return style.sentence(f"No mode: {reasons[0] if reasons else flows.reason or 'none is resolved'}.")
+def _without_modes(flows: FlowSet) -> Figure:
+    return style.sentence(f"No mode: {flows.reason or 'none is resolved'}.")
 
 
 def _profiles(ax: Axes, mode: Mode, top: float, length: float, scales: Scales | None) -> None:
