@@ -102,4 +102,4 @@ def test_a_function_that_is_given_is_called_instead(monkeypatch):
 def test_every_long_function_tells_its_progress(name):
     function = getattr(chuteflow, name)
     assert inspect.signature(function).parameters["progress"].default is None
-    assert "a terminal or notebook shows" in " ".join(inspect.getdoc(function).split())
+    assert "a terminal or notebook shows" in " ".join(str(inspect.getdoc(function)).split())

@@ -37,7 +37,7 @@ def find_extrema(values: Array, at: Array, *, passing: bool = False) -> list[Ext
         share = min(turning[(turning > 0.0) & (turning < 1.0)], key=lambda x: np.polyval(cubic, x), default=0.5)
         lowest = float(np.polyval(cubic, share))
         inside = zeros.real[(zeros.imag == 0.0) & (zeros.real > 0.0) & (zeros.real < 1.0)] if lowest < 0.0 else ()
-        out.append(Extremum(i, float(share), float(sign * lowest), tuple(sorted(map(float, inside)))))
+        out.append(Extremum(i, float(share), float(sign) * lowest, tuple(sorted(map(float, inside)))))
     return out
 
 

@@ -33,7 +33,7 @@ def sample_heights(sample: OverburdenSampler, own: float, top: float, tolerance:
     heights = sample(_SCOUTS)[0]
     ends = [_SCOUTS[np.flatnonzero(np.append(heights[:-1] >= height, True))[0]] for height in (min(own, top), top)]
     parts = (np.linspace(0.0, ends[0], _AT_FIRST + 1), np.log(np.linspace(1.0, np.exp(ends[0]), _AT_FIRST + 1)))
-    places = np.unique(np.concatenate([*parts, np.linspace(*ends, _AT_FIRST // 2)]))[::-1]
+    places = np.unique(np.concatenate([*parts, np.linspace(ends[0], ends[1], _AT_FIRST // 2)]))[::-1]
     found = sample(places)
     refine = np.ones(len(places) - 1, dtype=bool)
     for _ in range(_HALVINGS):

@@ -174,7 +174,7 @@ class PieceNodes:
         values = values.reshape(n + len(_CHECKS), self.pieces, -1)
         _, fit = _chebyshev_fit(self.degree)
         coefficients = _combine(fit, values[:n])
-        check = _combine(_CHECKS[:, None] ** np.arange(n), coefficients)
+        check = _combine(_CHECKS[:, None] ** np.arange(float(n)), coefficients)
         error = np.abs(check - values[n:]).max(axis=(0, 1))
         return FunctionTable(self.lower, self.upper, _with_slopes(coefficients, self.width), error, self.breaks)
 

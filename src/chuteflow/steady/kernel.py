@@ -206,8 +206,10 @@ def _assemble(
     by_ends[1, count, 0] = 0.0
     by_ends[0, 0, 2] = (shear_flux_mu + carried * (1.0 + (slip_x * rho + 0.5 * (f[8 + GAMMA] * rho - beta)) * q)) / flux
     by_ends[1, 0, 2] = moment_mu / moment - 1.0
-    by_slopes[0] /= flux
-    by_slopes[1] /= moment
+    for e in range(count):
+        for j in range(STAGES):
+            by_slopes[0, e, j] /= flux
+            by_slopes[1, e, j] /= moment
     closures(table, density_argument(p_s, ends[0, 0], beta) if p_s > 0.0 else 0.0, f)
     by_ends[0, 0, 1] = 1.0 - f[8 + GAMMA]  # d ln T_surface / d theta
     quantities[0] = math.log(flux)
@@ -363,6 +365,41 @@ def _change_of_quantities(
     out[3] = by_ends[0, 0, 1] * ends[0, 0]
 
 
+@compiled_in_place
+def _measure_off(rows: Any, quantities: Any, value: float) -> float:
+    """How far the condition is from being met."""
+    total = 0.0
+    for c in range(4):
+        total += rows[c] * quantities[c]
+    return abs(total - value)
+
+
+@compiled_in_place
+def _measure_change(change_ends: Any) -> float:
+    """The largest change of theta and y at the ends of elements, and of mu; infinite where one is not a number."""
+    count = len(change_ends) - 1
+    longest = abs(change_ends[count, 0])
+    for e in range(count):
+        for c in range(2):
+            if not abs(change_ends[e, c]) <= longest:
+                longest = abs(change_ends[e, c])
+                if not math.isfinite(longest):
+                    return math.inf
+    return longest
+
+
+@compiled_in_place
+def _move(ends: Any, slopes: Any, fraction: float, change_ends: Any, change_slopes: Any) -> None:
+    """Add a fraction of the changes."""
+    for e in range(len(ends)):
+        for c in range(2):
+            ends[e, c] += fraction * change_ends[e, c]
+    for e in range(len(slopes)):
+        for j in range(STAGES):
+            for c in range(2):
+                slopes[e, j, c] += fraction * change_slopes[e, j, c]
+
+
 @compiled
 def iterate(
     table: Any, chute: Any, gauss: Any, integrals: Any, breaks: Any, stretch: float, ends: Any, slopes: Any, mu: float,
@@ -389,7 +426,7 @@ def iterate(
     )
     if not math.isfinite(size):
         return mu, math.inf
-    size = max(size, abs((rows * quantities).sum() - value))
+    size = max(size, _measure_off(rows, quantities, value))
     longest = math.inf
     for _ in range(most):
         mass = math.exp(mu)
@@ -402,30 +439,28 @@ def iterate(
         for c in range(sides):
             change_e, change_s = change_ends[2 + c], change_slopes[2 + c]
             _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_e, change_s, errors[c])
-        longest = max(np.abs(change_ends[0, : count + 1]).max(), abs(change_ends[0, count + 1, 0]))
+        longest = _measure_change(change_ends[0])
         if not math.isfinite(longest):
             return mu, math.inf
         if longest < tolerance:
             # What the quantities change by is linear in so small a step.
-            ends += change_ends[0, : count + 1]
-            slopes += change_slopes[0]
+            _move(ends, slopes, 1.0, change_ends[0], change_slopes[0])
             last = np.empty(4)
             _change_of_quantities(integrals, breaks, by_ends, by_slopes, change_ends[0], change_slopes[0], last)
-            quantities += last
+            for c in range(4):
+                quantities[c] += last[c]
             return mu + change_ends[0, count + 1, 0], longest
         fraction = min(1.0, _LONGEST / longest)
         for _ in range(_HALVINGS):
-            ends += fraction * change_ends[0, : count + 1]
-            slopes += fraction * change_slopes[0]
+            _move(ends, slopes, fraction, change_ends[0], change_slopes[0])
             mu += fraction * change_ends[0, count + 1, 0]
             trial = _assemble(
                 table, chute, gauss, integrals, breaks, stretch, ends, slopes, mu, local, quantities, by_ends, by_slopes
             )
-            trial = max(trial, abs((rows * quantities).sum() - value)) if math.isfinite(trial) else trial
+            trial = max(trial, _measure_off(rows, quantities, value)) if math.isfinite(trial) else trial
             if trial < size * (1.0 - 0.1 * fraction) or (longest < 1e-4 and math.isfinite(trial)):
                 break
-            ends -= fraction * change_ends[0, : count + 1]
-            slopes -= fraction * change_slopes[0]
+            _move(ends, slopes, -fraction, change_ends[0], change_slopes[0])
             mu -= fraction * change_ends[0, count + 1, 0]
             fraction *= 0.5
         else:

@@ -71,19 +71,19 @@ def _closure_table(chosen: Law, e: float, slope: float, on: BaseCondition) -> Fu
     b = dilute_drift(chosen, e, slope)
     breaks = chosen.breaks_at(float(np.real(e)), float(np.real(slope)))
     scaled_breaks = np.array([nu / (1.0 - nu / np.real(chosen.densest)) for nu in breaks])
-    density = _density_table(chosen, e, slope, b, tuple(closure_coordinate(scaled_breaks).tolist()))
+    log_ratio, big_gamma = _density_tables(chosen, e, slope, b, tuple(closure_coordinate(scaled_breaks).tolist()))
     breaks_of_x = scaled_breaks
     if len(breaks):
-        log_ratio = density.values(closure_coordinate(scaled_breaks))[0]
-        breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(log_ratio)))
+        (there,) = log_ratio.values(closure_coordinate(scaled_breaks))
+        breaks_of_x = closure_coordinate(scaled_breaks * np.exp(np.real(there)))
     nodes = _nodes(tuple(breaks_of_x.tolist()))
-    ratio = _invert(density, nodes.argument)  # of density scaled by the free fraction to x
+    ratio = _invert(log_ratio, nodes.argument)  # of density scaled by the free fraction to x
     scaled = nodes.argument * np.exp(ratio)
     r = reduce(chosen, scaled, e, slope)
     log_free_fraction = -np.log1p(scaled * (1.0 / chosen.densest))
     k = (r.drift + b * r.stiffness) / (r.stiffness + r.drift)
     if np.all(b == 0.0):
-        gamma = density.values(closure_coordinate(scaled))[1]
+        (gamma,) = big_gamma.values(closure_coordinate(scaled))
     else:
         # ln T = theta + Gamma - beta ln p, which is ln p - ln g1
         gamma = -(ratio + log_free_fraction + np.log(r.compressibility))
@@ -116,8 +116,10 @@ def evaluate_closures(table: FunctionTable, x: Array, side: Array | None = None)
     return values, slopes * (x / ((x + OFFSET) * (1.0 + inner)))
 
 
-def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: tuple[float, ...]) -> FunctionTable:
-    """ln(x / scaled density) and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
+def _density_tables(
+    chosen: Law, e: float, slope: float, b: Any, breaks: tuple[float, ...]
+) -> tuple[FunctionTable, FunctionTable]:
+    """ln(x / scaled density), and Gamma, against the coordinate of the scaled density nu/(1 - nu/nu*), of which
     ``breaks`` are places where the law is not smooth."""
     nodes = _nodes(breaks)
     r = reduce(chosen, nodes.argument, e, slope)
@@ -127,20 +129,27 @@ def _density_table(chosen: Law, e: float, slope: float, b: Any, breaks: tuple[fl
     (big_gamma,) = gamma.values(nodes.pieces.x)
     log_g, log_free_fraction = np.log(r.compressibility), np.log(free_fraction)
     log_ratio = log_free_fraction + (log_g + big_gamma if np.all(b == 0.0) else (log_g + big_gamma) / (1.0 - b))
-    return nodes.pieces.table(np.stack([log_ratio, big_gamma], axis=-1))
+    return nodes.pieces.table(log_ratio[:, None]), gamma
 
 
-def _invert(density: FunctionTable, x: Array) -> Array:
+@lru_cache(maxsize=1)
+def _samples() -> tuple[Array, Array]:
+    """Coordinates at which the linear inverse is known, and the logarithms of the scaled densities there."""
+    samples = _argument(np.linspace(1e-9, UPPER, 400))
+    return closure_coordinate(samples), np.log(samples)
+
+
+def _invert(log_ratio: FunctionTable, x: Array) -> Array:
     """ln(scaled density / x) such that the density has this x, by Newton's method from a linear inverse."""
     log_x = np.log(np.maximum(x, 1e-300))
-    samples = _argument(np.linspace(1e-9, UPPER, 400))
-    log_ratio = density.values(closure_coordinate(samples))[0]
-    log_scaled = np.interp(log_x, np.log(samples) + log_ratio.real, np.log(samples))
+    samples, log_samples = _samples()
+    (there,) = log_ratio.values(samples)
+    log_scaled = np.interp(log_x, log_samples + there.real, log_samples)
     log_scaled = np.where(x < 1e-8, log_x, log_scaled)
     for _ in range(3):
         scaled = np.exp(log_scaled)
         inner = np.log1p(scaled * (1.0 / OFFSET))
-        values, slopes = density(np.log1p(inner))
+        values, slopes = log_ratio(np.log1p(inner))
         by_log = scaled / ((scaled + OFFSET) * (1.0 + inner))  # derivative of the coordinate
         step = (log_scaled + values[0] - log_x) / (1.0 + slopes[0] * by_log)
         log_scaled = log_scaled - step

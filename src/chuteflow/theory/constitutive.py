@@ -358,6 +358,8 @@ FUNCTIONS = {
     "dissipation": ("g5/nu^2", False),
     "bulk_viscosity": ("g6", False),
 }
+#: What they must be above where that is not 0 or nothing: dissipation may be 0.
+_LEAST_OF = {"dissipation": float(np.nextafter(0.0, -1.0))}
 #: Densities by which a law is known again, and at which it is tried.
 _KNOWN_BY = 25
 _TRIED = np.append(0.0, np.logspace(-4.0, 9.0, 261))
@@ -385,7 +387,8 @@ def _require_positive(law: Law, e: float, slope: float) -> None:
     if not isinstance(g, Coefficients):
         raise InputError(f"closure {law}: its function returns a {type(g).__name__}: must be Coefficients")
     functions = FUNCTIONS if g.density_flux is None else FUNCTIONS | {"density_flux": ("nu g4", False)}
-    for name, (symbol, positive) in functions.items():
+    table = np.empty((len(functions), len(nu)))
+    for row, (name, (symbol, _)) in zip(table, functions.items(), strict=True):
         values = getattr(g, name)
         if not isinstance(values, (np.ndarray, float, int)) or np.asarray(values).dtype.kind not in "fi":
             kind = values.dtype if isinstance(values, np.ndarray) else type(values).__name__
@@ -398,17 +401,19 @@ def _require_positive(law: Law, e: float, slope: float) -> None:
                 f"closure {law}: {symbol} ({name}) has the shape {np.shape(values)} for nu of the shape {nu.shape} at "
                 f"{_where(nu, e)}: must be the same"
             )
-        values = np.broadcast_to(values, nu.shape)
-        bad = ~np.isfinite(values) | ((values <= 0.0) if positive else (name == "dissipation") & (values < 0.0))
-        # A flux along the density gradient may grow like 1/nu where dilute.
-        bad[0] &= name != "density_conductivity"
-        if bad.any():
-            at = int(np.argmax(bad))
-            what = f"no positive {symbol}" if positive else f"no {symbol} that makes sense"
-            raise InputError(
-                f"closure {str(law)!r} has {what} at restitution e = {e}: it is {values[at]:g} at nu = {nu[at]:.6g}; "
-                "take a larger e or another closure"
-            )
+        row[:] = values
+    least = np.array([_LEAST_OF.get(name, 0.0 if positive else -np.inf) for name, (_, positive) in functions.items()])
+    bad = ~((table > least[:, None]) & (table < np.inf))
+    # A flux along the density gradient may grow like 1/nu where dilute.
+    bad[list(functions).index("density_conductivity"), 0] = False
+    for i in np.flatnonzero(bad.any(axis=1)).tolist():
+        symbol, positive = list(functions.values())[i]
+        at = int(np.argmax(bad[i]))
+        what = f"no positive {symbol}" if positive else f"no {symbol} that makes sense"
+        raise InputError(
+            f"closure {str(law)!r} has {what} at restitution e = {e}: it is {table[i, at]:g} at nu = {nu[at]:.6g}; "
+            "take a larger e or another closure"
+        )
     law.breaks_at(e, slope)
 
 

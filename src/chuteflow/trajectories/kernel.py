@@ -101,6 +101,26 @@ def _evaluate_integrands(values: Any, over: float, shear: float, big_l: float) -
     return over * root * root * height, shear * root * shearing
 
 
+@compiled
+def space_depths(first: float, deepest: float, p_1: float, step: float) -> Any:
+    """Overburdens from ``first`` to ``deepest``, evenly in tau = ln P + P/p_1, by ``step`` at most."""
+    low, high = math.log(first) + first / p_1, math.log(deepest) + deepest / p_1
+    count = math.ceil((high - low) / step)
+    out = np.empty(count + 1)
+    log_p = math.log(first)
+    for i in range(count + 1):
+        tau = low + (high - low) * i / count
+        # tau is convex in ln P: from below, Newton's method overshoots once and then comes down.
+        for _ in range(60):
+            p = math.exp(log_p)
+            change = (log_p + p / p_1 - tau) / (1.0 + p / p_1)
+            log_p -= change
+            if abs(change) < 1e-13:
+                break
+        out[i] = math.exp(log_p)
+    return out
+
+
 @compiled_in_place
 def _prepare_step(slope: float, p_s: float, p_1: float, over: float, after: float, out: Any) -> float:
     """Half of the step in tau from overburden ``over`` to ``after``; P, dP/dtau, slope P sqrt(p), p and 1/p at its ends
@@ -157,11 +177,11 @@ def _advance(values: Any, half_tau: float, lengths: Any, curve: Any, n: int, sto
 
 
 @compiled_in_place
-def _follow(out: Any, before: Any, i: int, q: int, half: float, rate: float, source: float) -> None:
-    """Entry ``i`` of function ``q``, whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
-    with half a step of ``half``; in balance at the first. ``before`` (7,) is what the next entry needs of this."""
-    out[i, q] = source / rate if i == 0 else (before[q] + half * source) / (1.0 + half * rate)
-    before[q] = out[i, q] + half * (source - rate * out[i, q])
+def _follow(before: float, half: float, rate: float, source: float, begins: bool) -> tuple[float, float]:
+    """The next value of a function whose derivative is ``source`` less ``rate`` times itself, by the trapezoidal rule
+    with half a step of ``half``, or in balance where it begins; and what the value after that needs as ``before``."""
+    value = source / rate if begins else (before + half * source) / (1.0 + half * rate)
+    return value, value + half * (source - rate * value)
 
 
 @compiled
@@ -198,16 +218,22 @@ def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, 
         shearing_slope = per * (values[ahead, SHEARING] - values[after, SHEARING])
         inverse, k = values[i, INVERSE], values[i, COUPLED]
         heating = 0.5 * (k * (1.0 + beta) - beta)
-        _follow(out, before, i, Y_1, half, 2.0 + heating, values[i, NET])
+        out[i, Y_1], before[Y_1] = _follow(before[Y_1], half, 2.0 + heating, values[i, NET], i == 0)
         y = out[i, Y_1]
-        _follow(out, before, i, L_2, half, 2.0, -y * inverse)
+        out[i, L_2], before[L_2] = _follow(before[L_2], half, 2.0, -y * inverse, i == 0)
         moved = out[i, L_2]
         heated = y * inverse * (1.0 - k) + (1.0 + beta) * moved * k_slope
-        _follow(out, before, i, Y_3, half, 4.0 + heating, moved * net_slope - 0.5 * y * heated)
-        _follow(out, before, i, H_1, half, 1.0 - beta, values[i, HEIGHT])
-        _follow(out, before, i, H_3, half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]))
-        _follow(out, before, i, G_1, half, 2.0 - 0.5 * beta, values[i, SHEARING])
-        _follow(out, before, i, G_3, half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]))
+        out[i, Y_3], before[Y_3] = _follow(
+            before[Y_3], half, 4.0 + heating, moved * net_slope - 0.5 * y * heated, i == 0
+        )
+        out[i, H_1], before[H_1] = _follow(before[H_1], half, 1.0 - beta, values[i, HEIGHT], i == 0)
+        out[i, H_3], before[H_3] = _follow(
+            before[H_3], half, 3.0 - beta, moved * (height_slope - values[i, HEIGHT]), i == 0
+        )
+        out[i, G_1], before[G_1] = _follow(before[G_1], half, 2.0 - 0.5 * beta, values[i, SHEARING], i == 0)
+        out[i, G_3], before[G_3] = _follow(
+            before[G_3], half, 4.0 - 0.5 * beta, moved * (shearing_slope - 0.5 * values[i, SHEARING]), i == 0
+        )
         least, most = min(low[i], low[ahead]), max(high[i], high[ahead])
         nearest = 0.0 if least <= 0.0 <= most else min(abs(least), abs(most))
         reached = math.exp((LOW + i / PER_UNIT + log_scale) / (1.0 + beta))
@@ -216,9 +242,8 @@ def _expand(values: Any, low: Any, high: Any, log_scale: float, deepest: float, 
 
 
 @compiled_in_place
-def _between(table: Any, i: int, t: float, column: int) -> float:
-    """One function at the place ``t`` from entry ``i`` to the next."""
-    return table[i, column] + t * (table[i + 1, column] - table[i, column])
+def _between(one: float, other: float, t: float) -> float:
+    return one + t * (other - one)
 
 
 @compiled_in_place
@@ -228,10 +253,10 @@ def _start_in_layer(values: Any, layer: Any, slope: float, over: float, theta_s:
     at = min(max((big_l - LOW) * PER_UNIT, 0.0), len(layer) - 1.000001)
     i = int(at)
     t, square, root = at - i, over * over, math.exp(-0.5 * big_l)
-    out[j, S_L] = big_l + square * (_between(layer, i, t, L_2))
-    y_1, y_3 = _between(layer, i, t, Y_1), _between(layer, i, t, Y_3)
-    h_1, h_3 = _between(layer, i, t, H_1), _between(layer, i, t, H_3)
-    g_1, g_3 = _between(layer, i, t, G_1), _between(layer, i, t, G_3)
+    out[j, S_L] = big_l + square * (_between(layer[i, L_2], layer[i + 1, L_2], t))
+    y_1, y_3 = _between(layer[i, Y_1], layer[i + 1, Y_1], t), _between(layer[i, Y_3], layer[i + 1, Y_3], t)
+    h_1, h_3 = _between(layer[i, H_1], layer[i + 1, H_1], t), _between(layer[i, H_3], layer[i + 1, H_3], t)
+    g_1, g_3 = _between(layer[i, G_1], layer[i + 1, G_1], t), _between(layer[i, G_3], layer[i + 1, G_3], t)
     out[j, S_Y] = over * (y_1 + square * y_3)
     out[j, S_H] = square * root * root * (h_1 + square * h_3)
     out[j, S_G] = slope * square * math.sqrt(over) * root * (g_1 + square * g_3)
@@ -685,83 +710,92 @@ def integrate(
 def find_zeros(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any) -> tuple[Any, Any]:
     """The zeros of B of the base in a column of ``table``: left or upper state, right or lower state, fraction
     between (Z, 3); and their neighbours along the zero set (Z, 2)."""
-    widest = 1
+    residual = np.empty(len(states))
+    count = _find_residuals(table, base, states, came_from, goes_on, first, residual)
+    zeros, links = np.empty((count, 3)), np.full((count, 2), -1, np.int64)
+    # Of each state, the zero between it and the next, and on its trajectory since the step before.
+    edge, side = np.full(len(states), -1, np.int64), np.full(len(states), -1, np.int64)
+    if count > 0:
+        _link_zeros(
+            residual, came_from, goes_on, first, edge, side, zeros, links, np.empty(64, np.int64), np.empty((64, 2))
+        )
+    return zeros, links
+
+
+@compiled_in_place
+def _find_residuals(table: Any, base: int, states: Any, came_from: Any, goes_on: Any, first: Any, residual: Any) -> int:
+    """B at all states, and the number of its zeros."""
+    count = 0
+    for i in range(len(states)):
+        residual[i] = states[i, S_Y] - interpolate_table(table, states[i, S_L], base)
     for step in range(len(first) - 1):
-        widest = max(widest, first[step + 1] - first[step])
-    zeros = np.empty((256, 3))
-    links = np.full((256, 2), -1, np.int64)
+        for i in range(first[step], first[step + 1]):
+            count += int(i + 1 < first[step + 1] and goes_on[i] and (residual[i] >= 0.0) != (residual[i + 1] >= 0.0))
+            previous = int(came_from[i])
+            if step > 0 and previous == came_from[i]:
+                count += int((residual[previous] >= 0.0) != (residual[i] >= 0.0))
+    return count
+
+
+@compiled_in_place
+def _link_zeros(
+    residual: Any, came_from: Any, goes_on: Any, first: Any, edge: Any, side: Any, zeros: Any, links: Any,
+    nodes: Any, places: Any,
+) -> None:  # fmt: skip
+    """The zeros and their neighbours; ``nodes`` and ``places`` are space for those around one cell."""
     n_zeros = 0
-    # Of this depth step, and of the one before: residual, and the zero between a state and the next.
-    residual, previous_residual = np.empty(widest), np.empty(widest)
-    edge, previous_edge = np.empty(widest, np.int64), np.empty(widest, np.int64)
-    side = np.empty(widest, np.int64)  # zero of a trajectory since the step before
-    previous_begin = 0
-    cell_nodes = np.empty(64, np.int64)
-    cell_places = np.empty((64, 2))
     for step in range(len(first) - 1):
         begin, end = first[step], first[step + 1]
-        zeros = _grow(zeros, n_zeros + 2 * (end - begin))
-        before = len(links)
-        links = _grow(links, n_zeros + 2 * (end - begin))
-        links[before:] = -1
-        for j in range(end - begin):
-            residual[j] = states[begin + j, S_Y] - interpolate_table(table, states[begin + j, S_L], base)
-            edge[j] = side[j] = -1
-        for j in range(end - begin - 1):
-            if (residual[j] >= 0.0) != (residual[j + 1] >= 0.0) and goes_on[begin + j]:
-                zeros[n_zeros, 0] = begin + j
-                zeros[n_zeros, 1] = begin + j + 1
-                zeros[n_zeros, 2] = residual[j] / (residual[j] - residual[j + 1])
-                edge[j] = n_zeros
+        for i in range(begin, end - 1):
+            if (residual[i] >= 0.0) != (residual[i + 1] >= 0.0) and goes_on[i]:
+                zeros[n_zeros, 0], zeros[n_zeros, 1] = i, i + 1
+                zeros[n_zeros, 2] = residual[i] / (residual[i] - residual[i + 1])
+                edge[i] = n_zeros
                 n_zeros += 1
-        for j in range(end - begin if step > 0 else 0):
-            previous = int(came_from[begin + j])
-            was = previous_residual[previous - previous_begin]
-            if (was >= 0.0) != (residual[j] >= 0.0) and previous == came_from[begin + j]:
-                zeros[n_zeros, 0] = previous
-                zeros[n_zeros, 1] = begin + j
-                zeros[n_zeros, 2] = was / (was - residual[j])
-                side[j] = n_zeros
+        if step == 0:
+            continue
+        for i in range(begin, end):
+            previous = int(came_from[i])
+            was = residual[previous]
+            if (was >= 0.0) != (residual[i] >= 0.0) and previous == came_from[i]:
+                zeros[n_zeros, 0], zeros[n_zeros, 1] = previous, i
+                zeros[n_zeros, 2] = was / (was - residual[i])
+                side[i] = n_zeros
                 n_zeros += 1
         # Lines through the cells between the steps.
-        left = 0 if step > 0 else end
-        while left < end - begin - 1:
+        left = begin
+        while left < end - 1:
             right = left + 1
-            while right < end - begin and came_from[begin + right] != int(came_from[begin + right]):
+            while right < end and came_from[right] != int(came_from[right]):
                 right += 1
-            if right < end - begin and goes_on[begin + left]:
+            if right < end and goes_on[left]:
                 count = 0
-                previous = previous_edge[int(came_from[begin + left]) - previous_begin]
-                if previous >= 0:
-                    cell_nodes[0] = previous
-                    cell_places[0, 0] = zeros[previous, 2]
-                    cell_places[0, 1] = 0.0
+                if edge[int(came_from[left])] >= 0:
+                    nodes[0] = edge[int(came_from[left])]
+                    places[0, 0] = zeros[nodes[0], 2]
+                    places[0, 1] = 0.0
                     count = 1
                 if side[right] >= 0:
-                    cell_nodes[count] = side[right]
-                    cell_places[count, 0] = 1.0
-                    cell_places[count, 1] = zeros[side[right], 2]
+                    nodes[count] = side[right]
+                    places[count, 0] = 1.0
+                    places[count, 1] = zeros[side[right], 2]
                     count += 1
                 width = right - left
                 for c in range(width - 1, -1, -1):
                     e = edge[left + c]
                     if e >= 0:
-                        cell_nodes[count] = e
-                        cell_places[count, 0] = (c + zeros[e, 2]) / width
-                        cell_places[count, 1] = 1.0
+                        nodes[count] = e
+                        places[count, 0] = (c + zeros[e, 2]) / width
+                        places[count, 1] = 1.0
                         count += 1
                 if side[left] >= 0:
-                    cell_nodes[count] = side[left]
-                    cell_places[count, 0] = 0.0
-                    cell_places[count, 1] = zeros[side[left], 2]
+                    nodes[count] = side[left]
+                    places[count, 0] = 0.0
+                    places[count, 1] = zeros[side[left], 2]
                     count += 1
                 if count > 1:
-                    _pair_zeros(cell_nodes, cell_places, count, links)
+                    _pair_zeros(nodes, places, count, links)
             left = right
-        residual, previous_residual = previous_residual, residual
-        edge, previous_edge = previous_edge, edge
-        previous_begin = begin
-    return zeros[:n_zeros], links[:n_zeros]
 
 
 @compiled

@@ -240,20 +240,20 @@ def integrate_trajectories_from(
     the first. Trajectories are followed to where their flux by shear is above ``largest_flux``."""
     t = tables(model)
     bounds, scale, steepest = t.bounds, t.scale, t.steepest
-    fluxes = np.concatenate([t.values[:, BASE, None], others], axis=1)
+    low = high = np.ascontiguousarray(t.values[:, BASE])
     if others.shape[1]:
+        fluxes = np.concatenate([t.values[:, BASE, None], others], axis=1)
+        low, high = fluxes.min(axis=1), fluxes.max(axis=1)
         bounds = bounds_for(model, fluxes)
         scale = max(scale, float(np.abs(others).max()))
     theta = surface_potential(model, temperature)
     first, layer_depth, layer = _LEAST_AT_INTERFACE, 0.0, np.empty((0, 7))
     if model.surface_stress == 0.0:
         layer_depth = min(_LAYER / max(t.rate, 1.0), 0.5 * deepest)
-        layer, nearest = kernel.expand_in_layer(
-            t.values, fluxes.min(axis=1), fluxes.max(axis=1), float(theta[0]), layer_depth
-        )
+        layer, nearest = kernel.expand_in_layer(t.values, low, high, float(theta[0]), layer_depth)
         first = min(max(nearest, _LEAST), layer_depth)
     p_1 = refinement.lengths / (refinement.step * max(t.rate, 1e-3))
-    overburden = _depths(first, deepest, p_1, refinement.step)
+    overburden = kernel.space_depths(first, deepest, p_1, refinement.step)
     states, came_from, goes_on, places, undecided, cells, status = kernel.integrate(
         t.values, bounds, float(model.slope), model.surface_stress, model.surface_flux, p_1,
         layer, layer_depth, steepest, overburden, np.log(temperature), theta,
@@ -264,18 +264,3 @@ def integrate_trajectories_from(
         model, refinement, overburden, states, came_from, goes_on, places, t.values, bounds, layer, scale, zeros,
         links, cells, undecided, status == kernel.DONE,
     )  # fmt: skip
-
-
-def _depths(first: float, deepest: float, p_1: float, step: float) -> Array:
-    """Overburdens evenly in tau = ln P + P/p_1."""
-    low, high = np.log(first) + first / p_1, np.log(deepest) + deepest / p_1
-    tau = np.linspace(low, high, int(np.ceil((high - low) / step)) + 1)
-    # ln P by Newton's method: tau is convex in it, so that starting on the high side it comes down.
-    log_p = np.minimum(np.where(tau < 0.0, tau, np.log(p_1 * np.maximum(tau, 1.0) + 1.0)), np.log(deepest))
-    for _ in range(60):
-        p = np.exp(log_p)
-        change = (log_p + p / p_1 - tau) / (1.0 + p / p_1)
-        log_p = log_p - change
-        if np.abs(change).max() < 1e-13:
-            break
-    return np.exp(log_p)

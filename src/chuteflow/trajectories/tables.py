@@ -64,14 +64,16 @@ def _closures(table: FunctionTable) -> Array:
 def tables(model: Model) -> Tables:
     """The tables of ``model``."""
     f = _closures(model.table)
-    values, bounds, rate, steepest = _tabulate(f, model.base_flux(f), float(model.slope), float(model.beta))
+    values, bounds, rate, steepest = _tabulate(
+        f, model.base_flux(f), np.exp(-f[DENSITY]), np.exp(0.5 * f[GAMMA]), float(model.slope), float(model.beta)
+    )
     return Tables(values, bounds, rate, steepest, model.flux_scale)
 
 
 @compiled
-def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, float, float]:
+def _tabulate(f: Any, base: Any, height: Any, root: Any, slope: float, beta: float) -> tuple[Any, Any, float, float]:
     """Functions, bounds, the fastest rate and the largest slope of b, see :class:`Tables`, from the closures (8,
-    entries) and the heat flux (entries,) that the base would give."""
+    entries), the heat flux (entries,) that the base would give, x/nu and exp(Gamma/2)."""
     entries = len(base)
     values = np.empty((entries, 7))
     bounds = np.empty((entries, 12))
@@ -81,21 +83,22 @@ def _tabulate(f: Any, base: Any, slope: float, beta: float) -> tuple[Any, Any, f
     for i in range(entries):
         conduction, coupling = f[CONDUCTION, i], f[COUPLING, i]
         net = f[LOSS, i] - slope * slope * f[WORK, i]
-        values[i, INVERSE] = 1.0 / conduction
+        inverse = 1.0 / conduction
+        values[i, INVERSE] = inverse
         values[i, COUPLED] = coupling
         values[i, NET] = net
         values[i, BASE] = base[i]
-        values[i, HEIGHT] = math.exp(-f[DENSITY, i])
-        values[i, SHEARING] = f[WORK, i] * math.exp(0.5 * f[GAMMA, i])
+        values[i, HEIGHT] = height[i]
+        values[i, SHEARING] = f[WORK, i] * root[i]
         values[i, BETA] = beta
-        curve = 0.5 * (1.0 - coupling) / conduction
+        curve = 0.5 * (1.0 - coupling) * inverse
         relax = 1.0 + 0.5 * (coupling * (1.0 + beta) - beta)
         net_low, net_high = min(net_low, net), max(net_high, net)
         curve_low, curve_high = min(curve_low, curve), max(curve_high, curve)
         base_low, base_high = min(base_low, base[i]), max(base_high, base[i])
         relax_high = max(relax_high, relax)
         spread = max(spread, conduction * (1.0 + beta))
-        rate = max(rate, 2.0 * abs(net) / conduction)
+        rate = max(rate, 2.0 * abs(net) * inverse)
         steepest = max(steepest, abs(base[i] - base[max(i - 1, 0)]) * PER_UNIT)
         bounds[i, NET_LOW], bounds[i, NET_HIGH] = net_low, net_high
         bounds[i, CURVE_LOW], bounds[i, CURVE_HIGH] = curve_low, curve_high
