@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -231,7 +231,7 @@ class Flow(Result):
     @property
     def surface_velocity(self) -> float:
         """u far above (half-line) or at the interface."""
-        return float(self._antiderivatives[1][0])
+        return float(self._velocities(np.zeros(1))[0])
 
     @property
     def mean_volume_fraction(self) -> float:
@@ -424,7 +424,7 @@ class Flow(Result):
 
     @cached_property
     def _antiderivatives(self) -> tuple[Array, Array]:
-        """At the nodes, integrals over the overburden from the base up: the regular part of z, and u."""
+        """At the nodes, integrals over the overburden from the base up: the regular parts of z and u."""
         problem, state = self.solution.problem, self._state
         g = problem.grid
         span = 1.0 / state.s_p  # dp/ds
@@ -445,8 +445,26 @@ class Flow(Result):
         else:
             regular = per_fall / state.p * span
         shear_rate = self._model.slope * state.f[WORK] * np.exp(0.5 * state.log_t) * span
+        if self._model.unlimited:
+            # Less what goes like sqrt(T) far above.
+            shear_rate[1:] -= self._shear_far_above * state.p[1:] ** (-0.5 * self._model.beta) * span[1:]
+            shear_rate[0] = 0.0
         height, velocity = g.integrate(np.stack([regular, shear_rate]))
         return height[-1] - height, self._slip + velocity[-1] - velocity
+
+    @property
+    def _shear_far_above(self) -> Any:
+        """Where T has no limit far above: du/dp p^(beta/2) there."""
+        return self._model.slope * self._state.f[WORK, 0] * np.sqrt(self._limit)
+
+    def _velocities(self, share: Array) -> Array:
+        s = stretch_position(share, self.solution.problem.stretch)
+        velocity = self.solution.problem.grid.interpolate(self._antiderivatives[1], s)
+        if self._model.unlimited:
+            mass, power = self._state.mass[0], 1.0 - 0.5 * self._model.beta
+            powers = mass**power - (mass * np.maximum(share, _SMALLEST_SHARE)) ** power
+            velocity = velocity + self._shear_far_above / power * powers
+        return velocity
 
     def _heights(self, share: Array) -> Array:
         s = stretch_position(share, self.solution.problem.stretch)
@@ -490,9 +508,7 @@ class Flow(Result):
 
     @_vanishing
     def _fields(self, share: Array) -> dict[str, Array]:
-        s = stretch_position(share, self.solution.problem.stretch)
-        velocity = self.solution.problem.grid.interpolate(self._antiderivatives[1], s)
-        return self._local(*self._at_share(share)) | {"velocity": velocity}
+        return self._local(*self._at_share(share)) | {"velocity": self._velocities(share)}
 
     def _local(self, at: dict[str, Array], f: Array) -> dict[str, Array]:
         """The fields that follow from what :meth:`_pointwise` gives."""

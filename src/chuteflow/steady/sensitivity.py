@@ -88,7 +88,7 @@ class _PerturbedFlow(Flow):
             "depth": depth,
             "interface_height": float(derivative(self._heights(np.zeros(1))[0])) if start.bounded else np.nan,
             "mean_velocity": flow.mass_flux / flow.mass_holdup * (log_q - log_m),
-            "surface_velocity": float(derivative(self._antiderivatives[1][0])),
+            "surface_velocity": float(derivative(self._velocities(np.zeros(1))[0])),
             "mean_volume_fraction": (
                 (flow.mass_holdup * log_m * (1.0 - start.above) - flow.mass_holdup * above) / flow.depth
                 - flow.mass_holdup * (1.0 - start.above) * depth / flow.depth**2
