@@ -195,7 +195,8 @@ def expand_in_layer(values: Any, low: Any, high: Any, log_scale: float, deepest:
         L = lambda + P^2 L_2,    y = P (Y_1 + P^2 Y_3),
         integral of P dz = P^2 exp(-lambda) (H_1 + P^2 H_3),    of P du = slope P^(5/2) exp(-lambda/2) (G_1 + P^2 G_3)
 
-    with functions of lambda alone (entries, 7), whose derivatives follow by comparing powers of P.
+    with functions of lambda alone (entries, 7), whose derivatives follow by comparing powers of P. The terms of lowest
+    order are (3.23)-(3.25).
     """
     last = int(((1.0 + values[0, BETA]) * math.log(deepest) - log_scale - LOW) * PER_UNIT) + 2
     last = min(max(last, 1), ENTRIES - 1)
