@@ -321,6 +321,8 @@ def _step(
     for c in range(r):
         right[0, c], right[2, c] = carried[5 + c], border[5 + c]
     right[1, 0] = flux - ends[count, 1]
+    for c in range(2, r):
+        right[1, c] = _ROUNDING * (abs(flux) + 2.0 * abs(chute[3]))
     if not _solve_dense(last, right):
         return False
     for c in range(r):
