@@ -6,7 +6,7 @@ import math
 import re
 from typing import Any
 
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shorten
 from chuteflow.errors import InputError
 from chuteflow.extras import require
 
@@ -38,7 +38,7 @@ def positive_amount(what: str, value: Any, unit: str) -> float:
     """
     found = read_si(what, value, unit) if isinstance(value, str) else number(what, value)
     if not (math.isfinite(found) and found > 0.0):
-        raise InputError(f"{what} = {shown(value)}: must be a positive number")
+        raise InputError(f"{what} = {shorten(value)}: must be a positive number")
     return found
 
 

@@ -25,7 +25,7 @@ def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf
     found = real(name, value, _from_to(low, high))
     if not (math.isfinite(found) and low <= found <= high):
         kind = "" if math.isfinite(found) or math.isfinite(high) else " a finite number"
-        raise InputError(f"{name} = {shown(value)}: must be{kind}{_from_to(low, high)}")
+        raise InputError(f"{name} = {shorten(value)}: must be{kind}{_from_to(low, high)}")
     return found
 
 
@@ -44,7 +44,7 @@ def real(name: str, value: Any, allowed: str = "") -> float:
         return math.inf
     except (TypeError, ValueError):
         pass
-    raise InputError(f"{name} = {shown(value)}: must be a number{allowed}")
+    raise InputError(f"{name} = {shorten(value)}: must be a number{allowed}")
 
 
 def number_in(name: str, text: str, low: float = -math.inf, high: float = math.inf) -> float:
@@ -56,7 +56,7 @@ def number_in(name: str, text: str, low: float = -math.inf, high: float = math.i
     try:
         found = float(text)
     except ValueError:
-        raise InputError(f"{name} = {shown(text)}: must be a number{_from_to(low, high)}") from None
+        raise InputError(f"{name} = {shorten(text)}: must be a number{_from_to(low, high)}") from None
     return number(name, found, low, high)
 
 
@@ -71,9 +71,9 @@ def whole(name: str, value: Any, low: float, high: float = math.inf) -> int:
     except (TypeError, ValueError, OverflowError):
         found = None
     if found is None or found != value:
-        raise InputError(f"{name} = {shown(value)}: must be a whole number{_from_to(low, high)}")
+        raise InputError(f"{name} = {shorten(value)}: must be a whole number{_from_to(low, high)}")
     if not low <= found <= high:
-        raise InputError(f"{name} = {shown(value)}: must be{_from_to(low, high)}")
+        raise InputError(f"{name} = {shorten(value)}: must be{_from_to(low, high)}")
     return found
 
 
@@ -86,11 +86,11 @@ def pair(name: str, value: Any) -> tuple[float, float]:
     try:
         low, high = value
     except (TypeError, ValueError):
-        raise InputError(f"{name} = {shown(value)}: must be two numbers, the second larger than the first") from None
+        raise InputError(f"{name} = {shorten(value)}: must be two numbers, the second larger than the first") from None
     return number(name, low), number(name, high)
 
 
-def checked_size(size: Any, fewest: int, most: int) -> tuple[int, int]:
+def check_size(size: Any, fewest: int, most: int) -> tuple[int, int]:
     """Numbers of points along two axes.
 
     Raises:
@@ -100,9 +100,9 @@ def checked_size(size: Any, fewest: int, most: int) -> tuple[int, int]:
     try:
         x, y = (whole("size", points, -math.inf) for points in size)
     except (TypeError, ValueError):
-        raise InputError(f"size = {shown(size)}: {allowed}") from None
+        raise InputError(f"size = {shorten(size)}: {allowed}") from None
     if not (fewest <= min(x, y) and max(x, y) <= most):
-        raise InputError(f"size {shown(x)}x{shown(y)}: {allowed}")
+        raise InputError(f"size {shorten(x)}x{shorten(y)}: {allowed}")
     return x, y
 
 
@@ -117,13 +117,13 @@ def real_array(name: str, values: Any) -> NDArray[np.float64]:
     try:
         found = np.asarray(values)
     except (TypeError, ValueError):
-        raise InputError(f"{name} = {shown(values)}: must be an array of numbers") from None
+        raise InputError(f"{name} = {shorten(values)}: must be an array of numbers") from None
     if found.size and found.dtype.kind not in "iuf":
-        raise InputError(f"{name} = {shown(values)}: must be an array of numbers")
+        raise InputError(f"{name} = {shorten(values)}: must be an array of numbers")
     return found.astype(float)
 
 
-def shown(value: Any) -> str:
+def shorten(value: Any) -> str:
     """``value`` for a message: on one line, and not too long."""
     try:
         text = f"{value:g}" if isinstance(value, float) else repr(value)

@@ -29,14 +29,14 @@ def span(name: str, values: Iterable[float]) -> str:
     return f"{name} from {number(min(finite))} to {number(max(finite))}" if finite else f"{name} not known"
 
 
-def listed(values: Sequence[float]) -> str:
+def list_numbers(values: Sequence[float]) -> str:
     """Some numbers, or where there are many the first and the last of them."""
     if len(values) <= _LISTED:
         return ", ".join(map(number, values))
     return f"{number(values[0])} to {number(values[-1])}"
 
 
-def counted(count: int, one: str, more: str | None = None) -> str:
+def count_of(count: int, one: str, more: str | None = None) -> str:
     """A number of things, such as "1 flow" or "3 flows"."""
     return f"{count} {one if count == 1 else more or f'{one}s'}"
 

@@ -73,7 +73,7 @@ class WorkerPool(ProcessPoolExecutor):
     def end(self) -> None:
         """End all workers at once, whatever they do."""
         # A second interrupt must not leave a half of them.
-        with interrupts_held_back():
+        with hold_back_interrupts():
             workers, manager = self._workers(), getattr(self, "_executor_manager_thread", None)
             self.shutdown(wait=False, cancel_futures=True)
             for process in workers:
@@ -142,7 +142,7 @@ def require_main_guard() -> None:
 
 
 @contextmanager
-def interrupts_held_back() -> Iterator[None]:
+def hold_back_interrupts() -> Iterator[None]:
     """Interrupts of this thread come after the block, where the system can hold them back."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -165,7 +165,7 @@ def starting_processes() -> Iterator[None]:
 
         # Left to start with the first process, it would let interrupts through again.
         resource_tracker.ensure_running()
-    with interrupts_held_back(), _environment, _one_thread(), _script_that_is_a_file():
+    with hold_back_interrupts(), _environment, _one_thread(), _script_that_is_a_file():
         yield
 
 

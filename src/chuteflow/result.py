@@ -24,12 +24,12 @@ class Compared:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return self is other or _same(self._compared(), other._compared())  # pyright: ignore[reportAttributeAccessIssue]
+        return self is other or _same(self._comparison_key(), other._comparison_key())  # pyright: ignore[reportAttributeAccessIssue]
 
     def __hash__(self) -> int:
         return hash((type(self).__name__, self._mark()))
 
-    def _compared(self) -> tuple[Any, ...]:
+    def _comparison_key(self) -> tuple[Any, ...]:
         """What two results are compared by."""
         return tuple(getattr(self, one.name) for one in fields(self) if one.compare)  # pyright: ignore[reportArgumentType]
 

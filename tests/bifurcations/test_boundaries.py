@@ -225,7 +225,7 @@ def test_derivatives_of_the_augmented_system_are_those_of_differences(folds, sec
         return Linearisation.at(Collocation(here, degree, stretch), Collocation(beyond, degree, stretch), z)
 
     base = local(z, value)
-    made = [point.system.condition.based(base), *conditions()]
+    made = [point.system.condition.adapt_to(base), *conditions()]
     step = 1e-5
     by_z = local(z + step * direction, value), local(z - step * direction, value)
     by_value = local(z, value + step), local(z, value - step)

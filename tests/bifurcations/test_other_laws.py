@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chuteflow import Chute, boundary, curve
-from chuteflow.bifurcations.grids import pinned
+from chuteflow.bifurcations.grids import pin
 from chuteflow.numerics.complex_step import derivative, stepped
 from chuteflow.steady.solver import SolverStatus
 
@@ -46,7 +46,7 @@ def test_pinned_breaks_have_exact_derivatives():
     """A flow that passes two breaks of its law: Jacobian and gradients against complex steps."""
     found = curve(Chute(0.3, **GRAINS, closure="extended"), points=12).branches[0].flows[-3]
     assert found.solution.status is SolverStatus.CONVERGED
-    problem, z = pinned(found.solution.problem, found.solution.z)
+    problem, z = pin(found.solution.problem, found.solution.z)
     assert len(problem.pins) >= 2
     assert np.abs(problem.state(z).residual()).max() < 1e-9
     nodes = len(problem.grid.nodes)

@@ -255,7 +255,7 @@ def test_where_families_are_many_already_the_range_is_not_extended():
 )
 def test_trajectories_need_not_be_followed_to_larger_fluxes(chute, flux):
     every = flows(chute, Q=flux)
-    found = flows_within(chute, LOG_Q, flux, TOLERANCE, SearchRange.checked((1e-3, 1e5), 30.0).restricted(LOG_Q, flux))
+    found = flows_within(chute, LOG_Q, flux, TOLERANCE, SearchRange.checked((1e-3, 1e5), 30.0).restrict(LOG_Q, flux))
     assert len(found) == len(every) > 0
     for one, other in zip(found, every, strict=True):
         assert one.mass_holdup == pytest.approx(other.mass_holdup, rel=1e-9)

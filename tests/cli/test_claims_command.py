@@ -92,7 +92,7 @@ def test_bad_input_is_one_line_and_2(refused, arguments, words):
 
 def test_progress_is_shown_on_a_terminal_alone(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    found = list(claims_command._watched(check(QUICK.split(",")), 3))
+    found = list(claims_command._watch(check(QUICK.split(",")), 3))
     assert len(found) == 3
     assert "2 of 3 claims" in capsys.readouterr().err
 

@@ -11,7 +11,7 @@ from chuteflow.branches.enumeration import flows
 from chuteflow.cli.program import main
 from chuteflow.dem import records, study
 from chuteflow.dem.recovery import recover
-from chuteflow.dem.results import read_folder, rest_slope, table, thinned
+from chuteflow.dem.results import read_folder, rest_slope, table, thin
 from chuteflow.errors import InputError
 from chuteflow.plotting.results_plot import plot_results
 
@@ -52,7 +52,7 @@ def test_a_folder_without_flows_is_told(tmp_path):
 
 def test_fewer_heights_keep_the_means(folder):
     whole = records.load(folder / "one.csv")
-    few = thinned(whole, 20)
+    few = thin(whole, 20)
     assert 10 <= len(few.height) <= 20
     assert few.tenths is whole.tenths
     assert set(few.height) <= set(whole.height)
@@ -87,8 +87,8 @@ def test_the_study_has_what_was_promised():
 
 def test_the_study_resumes_what_is_there(tmp_path):
     case = next(study.cases())
-    first = study.prepared(case, tmp_path)
-    assert study.prepared(case, tmp_path) == first
+    first = study.prepare_case(case, tmp_path)
+    assert study.prepare_case(case, tmp_path) == first
     assert first.scene.temperature != case.scene.temperature
 
 

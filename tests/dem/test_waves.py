@@ -10,7 +10,7 @@ from chuteflow.cli.program import main
 from chuteflow.dem import script
 from chuteflow.dem.run import prepare
 from chuteflow.dem.script import Schedule
-from chuteflow.dem.waves import Amplitudes, amplitudes, growth, read_amplitudes, written
+from chuteflow.dem.waves import Amplitudes, amplitudes, format_csv, growth, read_amplitudes
 from chuteflow.errors import InputError
 
 DATA = Path(__file__).resolve().parents[2] / "docs" / "measured" / "waves"
@@ -77,7 +77,7 @@ def test_a_wave_of_a_run_is_that_of_its_box(small, tmp_path):
 
 def test_the_command_tells_writes_and_reads_waves(tmp_path, capsys):
     path = tmp_path / "waves.csv"
-    path.write_text(written(made(0.02, 0.11)))
+    path.write_text(format_csv(made(0.02, 0.11)))
     assert main(["dem", "waves", str(path), "--from", "60", "--save", str(tmp_path / "again.csv")]) == 0
     out = capsys.readouterr().out
     assert "rate 0.02 ± " in out

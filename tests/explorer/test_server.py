@@ -212,7 +212,7 @@ def test_what_a_column_is_near_is_checked(client, near, said):
 
 
 def test_what_is_left_out_comes_with_how_to_compute_it_elsewhere():
-    given = answers.left_out("flows", PAPER | {"Q": "3"}, "no time")
+    given = answers.leave_out("flows", PAPER | {"Q": "3"}, "no time")
     content = json.loads(given.body)
     assert (given.status, content["error"]) == (422, "the flows at this flux are left out: no time")
     assert content["recipes"]["command"].startswith("chuteflow solve --slope 0.3 ")

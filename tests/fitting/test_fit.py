@@ -18,7 +18,7 @@ from chuteflow.fitting.objective import Objective
 from chuteflow.fitting.prediction import predict
 from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.fitting.sampling import sample
-from chuteflow.steady.free import chosen_parameters
+from chuteflow.steady.free import choose_parameters
 
 from .trials import FIRST, FREE, measured, trial
 
@@ -75,7 +75,7 @@ def test_the_jacobian_is_that_of_differences(flow, exact, relative):
     }  # fmt: skip
     numbers = {"M": 1.2} | ({"Q": 3.0} if exact else {})
     data = exact_profiles(flow, numbers=numbers, **errors)
-    free = chosen_parameters(TRUE, FREE, {})
+    free = choose_parameters(TRUE, FREE, {})
     case = TrialChute.of(data.experiments[0], TRUE, free)
     objective = Objective((case,), True, "linear")
     place = TrialFlow.of(case, flow, VALUES)

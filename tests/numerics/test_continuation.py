@@ -128,7 +128,7 @@ FINE = 32
 class RefinedBratu(Bratu):
     """Bratu's problem on a coarse grid, and on a fine one as soon as the solution reaches 2."""
 
-    def adapted(self, z: Array, tangent: Array) -> tuple[RefinedBratu, Array, Array] | None:
+    def adapt(self, z: Array, tangent: Array) -> tuple[RefinedBratu, Array, Array] | None:
         if self.degree == FINE or self.middle(z) < 2.0:
             return None
         return RefinedBratu(FINE), self.carried(z), self.carried(tangent)
@@ -740,7 +740,7 @@ def test_a_change_of_discretisation_does_not_break_the_path(control):
 
 def test_a_system_that_always_asks_for_a_change_gets_one_between_steps():
     class Restless(RefinedBratu):
-        def adapted(self, z: Array, tangent: Array) -> tuple[RefinedBratu, Array, Array]:
+        def adapt(self, z: Array, tangent: Array) -> tuple[RefinedBratu, Array, Array]:
             return Restless(self.degree), z, tangent
 
     system = Restless(12)

@@ -16,7 +16,7 @@ from chuteflow.cli.program import main
 from chuteflow.paper import figure_17
 from chuteflow.paper.curves import Curves, trace
 from chuteflow.paper.data import csv_text
-from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, figure, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, compute, drawn, figure, method_note
 from chuteflow.paper.materials import dissipative, productive
 from chuteflow.paper.sources import (
     NOT_REACHED,
@@ -43,7 +43,7 @@ AGREEMENT = 1e-8
 
 def data_by(number: int, method: Source) -> Any:
     """The data of a figure by a method."""
-    return computed(number, method)
+    return compute(number, method)
 
 
 def named(data: Any) -> list[Any]:

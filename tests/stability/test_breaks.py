@@ -26,9 +26,9 @@ class Smoothed(Extended):
     def breaks(self, e, slope):
         return super().breaks(e, slope) if self.width == 0.0 else ()
 
-    def _shortened(self, plain, nu, free_fraction, e, rate):
+    def _shorten(self, plain, nu, free_fraction, e, rate):
         if self.width == 0.0:
-            return super()._shortened(plain, nu, free_fraction, e, rate)
+            return super()._shorten(plain, nu, free_fraction, e, rate)
         above = self._length(plain, nu, free_fraction, e, rate) - 1.0
         return replace(plain, dissipation=plain.dissipation / (1.0 + 0.5 * (above + np.sqrt(above**2 + self.width**2))))
 

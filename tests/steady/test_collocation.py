@@ -84,6 +84,6 @@ def test_the_stretch_is_monotonic_from_0_to_1_and_invertible(stretch, degree):
 def test_transfer_to_another_grid_keeps_the_flow():
     flow = flows(CHUTES[0], Q=3.0)[1]
     problem, z = flow.solution.problem, flow.solution.z
-    other, matrix = problem.transferred(54, 3.0)
+    other, matrix = problem.transfer(54, 3.0)
     moved = other.state(np.concatenate([matrix @ z[:-2], z[-2:]]))
     np.testing.assert_allclose(moved.macroscopic(), flow.solution.macroscopic, atol=1e-9)

@@ -225,7 +225,7 @@ def test_it_can_go_on_by_itself_to_another_chute():
 
 def test_another_degree_and_multiple_is_the_same_flow():
     first = refine(PAPER, references("paper")[1], AT_FLUX, 1e-11, multiple=1)
-    system, matrix = first.system.transferred(60, 3)
+    system, matrix = first.system.transfer(60, 3)
     residual, _ = system.residual_and_jacobian(matrix @ first.z)
     assert np.abs(residual).max() < 1e-7
     np.testing.assert_allclose(system.macroscopic(matrix @ first.z), first.macroscopic, atol=1e-9)
@@ -299,7 +299,7 @@ def traced(
 ) -> list[CurvePoint[MappedSystem]]:
     """Points from a solution on, as ln S times ``direction`` grows, until T_surface is below ``coldest``."""
     degree = min(d for d in DEGREES if d >= solution.degree)
-    system, matrix = solution.system.transferred(degree, solution.system.multiple)
+    system, matrix = solution.system.transfer(degree, solution.system.multiple)
     ahead = np.zeros(len(system.weights))
     ahead[-2] = direction
     points = []

@@ -10,8 +10,8 @@ from chuteflow import Chute, Flow, InputError, curve, flows, load, save
 from chuteflow.numerics.complex_step import STEP
 from chuteflow.steady import linearised
 from chuteflow.steady.collocation import LOG_Q
-from chuteflow.steady.free import all_free, free_parameter, varied
-from chuteflow.steady.model import stepped_model
+from chuteflow.steady.free import all_free, free_parameter, vary
+from chuteflow.steady.model import step_model
 from chuteflow.steady.quantities import FIELDS, NUMBERS
 from chuteflow.steady.sensitivity import sensitivity
 
@@ -35,7 +35,7 @@ def coldest(chute, condition):
 
 def through_the_solver(flow, parameter, at):
     """Derivatives of ln Q, ln h, ln M and ln T_surface by Newton's method in complex numbers from ``flow``."""
-    problem = replace(flow.solution.problem, model=stepped_model(flow.chute, parameter.model_name))
+    problem = replace(flow.solution.problem, model=step_model(flow.chute, parameter.model_name))
     z = flow.solution.z.astype(complex)
     target = flow.solution.state.macroscopic()[at]
     for _ in range(4):
@@ -91,7 +91,7 @@ def differences(flow, condition, parameter, z, step):
     fields = {name: np.zeros(len(z)) for name in FIELDS}
     for k, weight in enumerate(WEIGHTS, 1):
         for sign in (1.0, -1.0):
-            there = coldest(varied(flow.chute, [parameter], [value + sign * k * step]), condition)
+            there = coldest(vary(flow.chute, [parameter], [value + sign * k * step]), condition)
             profile = there.profile(z)
             for name in NUMBERS:
                 numbers[name] += sign * weight * getattr(there, name) / step

@@ -14,7 +14,7 @@ from chuteflow.steady.model import model
 from chuteflow.steady.solver import (
     Condition,
     SolverStatus,
-    checked_tolerance,
+    check_tolerance,
     resolve,
     solve,
 )
@@ -30,7 +30,7 @@ def test_the_estimated_error_bounds_the_true_one(chute, temperature, tolerance):
     for flow in flows(chute, T_surface=temperature, tolerance=tolerance):
         solution = flow.solution
         condition = Condition.fix(LOG_T, temperature)
-        exact = solve(solution.elements.halved().halved(), condition, 1e-11)
+        exact = solve(solution.elements.halve().halve(), condition, 1e-11)
         true = np.abs(np.expm1(solution.macroscopic - exact.macroscopic))[:LOG_T].max()
         assert true <= flow.error <= tolerance
 
@@ -138,7 +138,7 @@ def test_fields_of_a_flow_on_a_thousand_elements_take_no_time_and_files_keep_it(
 @pytest.mark.parametrize("tolerance", [0.0, 1e-12, 0.1, float("nan")])
 def test_a_tolerance_out_of_range_is_refused(tolerance):
     with pytest.raises(InputError, match="must be from 1e-11 to 1e-3"):
-        checked_tolerance(tolerance)
+        check_tolerance(tolerance)
 
 
 def test_profiles_of_a_flow_that_was_asked_for_roughly_have_digits():

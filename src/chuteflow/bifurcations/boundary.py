@@ -13,7 +13,7 @@ import numpy as np
 from chuteflow import display
 from chuteflow.bifurcations import starting_points
 from chuteflow.bifurcations.points import BoundaryPoint
-from chuteflow.bifurcations.starting_points import followed
+from chuteflow.bifurcations.starting_points import may_follow
 from chuteflow.bifurcations.system import SecondParameter
 from chuteflow.bifurcations.tracing import CONTROL, BoundaryTracing, TracedBoundary, trace_boundary
 from chuteflow.branches.ranges import SearchRange
@@ -30,7 +30,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.line import LineOfFlows
 from chuteflow.steady.quantities import NUMBERS, PLACE
-from chuteflow.steady.solver import TOLERANCE, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, check_tolerance
 from chuteflow.theory.constitutive import require_height
 from chuteflow.threads import on_one_thread
 
@@ -73,9 +73,9 @@ class Boundary(Result, LineOfFlows):
     traced: TracedBoundary = field(repr=False, compare=False)
 
     def __repr__(self) -> str:
-        turns = display.counted(len(self.special), "turning point")
+        turns = display.count_of(len(self.special), "turning point")
         reach = (display.span(self.second, self.parameter), display.span("Q", self.mass_flux))
-        points = display.counted(len(self.flows), "point")
+        points = display.count_of(len(self.flows), "point")
         return display.line("Boundary", f"{self.kind} in {self.second}", f"{points}, {turns}", *reach)
 
     def _repr_html_(self) -> str:
@@ -147,7 +147,7 @@ class BoundarySet(Result, Sequence[Boundary]):
     def incomplete(self) -> str | None:
         """Which flows boundaries were not followed among, in words; None where there are none."""
         solutions = (solution for branches in self.families for branch in branches for solution in branch.solutions)
-        if all(followed(solution) for solution in solutions):
+        if all(may_follow(solution) for solution in solutions):
             return None
         return (
             "some deep flows wind more than a grid of few pieces resolves: boundaries among these are not followed, "
@@ -155,14 +155,14 @@ class BoundarySet(Result, Sequence[Boundary]):
         )
 
     def __repr__(self) -> str:
-        count = display.counted(len(self), "boundary", "boundaries")
+        count = display.count_of(len(self), "boundary", "boundaries")
         bounds = f"{self.second} from {display.number(self.bounds[0])} to {display.number(self.bounds[1])}"
         return display.line("BoundarySet", f"{count} of {self.kind}", bounds, self.reason)
 
     def _repr_html_(self) -> str:
         rows = [
             [
-                *(str(i), display.counted(len(one.flows), "point"), display.span(self.second, one.parameter)),
+                *(str(i), display.count_of(len(one.flows), "point"), display.span(self.second, one.parameter)),
                 *(display.span("Q", one.mass_flux), ", ".join(turn.kind for turn in one.special), *one.ends),
             ]
             for i, one in enumerate(self, 1)
@@ -233,9 +233,9 @@ def boundary(
                 control=control,
                 progress=lambda what, fraction: tell(fraction),
             )
-    sweep = _checked(chute, of, second, bounds)
+    sweep = _check_second(chute, of, second, bounds)
     samples = whole("samples", samples, 2, 1000)
-    tolerance = checked_tolerance(tolerance)
+    tolerance = check_tolerance(tolerance)
     within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     found: list[TracedBoundary] = []
     sampled: list[float] = []
@@ -286,7 +286,7 @@ def boundary(
     )
 
 
-def _checked(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> SecondParameter:
+def _check_second(chute: Chute, of: str, second: str, bounds: tuple[float, float]) -> SecondParameter:
     if of not in KINDS:
         raise InputError(f"cannot follow {of!r}: choose one of {', '.join(KINDS)}")
     if second not in PARAMETERS:

@@ -89,7 +89,7 @@ class TestFunction(Protocol):
         """Whether it is made for this grid, and well conditioned here."""
         ...
 
-    def based(self, at: Linearisation) -> TestFunction:
+    def adapt_to(self, at: Linearisation) -> TestFunction:
         """The same condition, made for this grid and place."""
         ...
 
@@ -112,35 +112,35 @@ class Fold:
 
     def __call__(self, at: Linearisation) -> tuple[float, Array, float]:
         """See :class:`TestFunction`."""
-        g, v, w = self._solved(at)
+        g, v, w = self._solve(at)
         which = self.which
         aside = along(at, v)
-        by_z = w @ _bordered(aside.jacobian(), aside.macroscopic_gradient()[which])
-        by_parameter = w @ _bordered(at.stepped.jacobian(), at.stepped.macroscopic_gradient()[which]) @ v
+        by_z = w @ _border(aside.jacobian(), aside.macroscopic_gradient()[which])
+        by_parameter = w @ _border(at.stepped.jacobian(), at.stepped.macroscopic_gradient()[which]) @ v
         return g, -derivative(by_z), -float(derivative(by_parameter))
 
     def suits(self, at: Linearisation) -> bool:
         """See :class:`TestFunction`."""
         if len(self.left) != len(at.z):
             return False
-        _, v, w = self._solved(at)
+        _, v, w = self._solve(at)
         return max(float(np.linalg.norm(v)), float(np.linalg.norm(w))) < _TURNED
 
-    def based(self, at: Linearisation) -> Fold:
+    def adapt_to(self, at: Linearisation) -> Fold:
         """See :class:`TestFunction`."""
         # The best borders are the singular vectors of the least singular value.
-        u, _, v = np.linalg.svd(_bordered(at.by_z, at.state.macroscopic_gradient()[self.which]))
+        u, _, v = np.linalg.svd(_border(at.by_z, at.state.macroscopic_gradient()[self.which]))
         return Fold(self.which, u[:, -1], v[-1])
 
     def pivot(self, at: Linearisation) -> float:
         """Fraction of the gradient of the quantity in the left null vector: 0 where the branch itself is singular."""
-        _, _, w = self._solved(at)
+        _, _, w = self._solve(at)
         return abs(float(w[-1])) / float(np.linalg.norm(w))
 
-    def _solved(self, at: Linearisation) -> tuple[float, Array, Array]:
+    def _solve(self, at: Linearisation) -> tuple[float, Array, Array]:
         n = len(self.left)
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n] = _bordered(at.by_z, at.state.macroscopic_gradient()[self.which])
+        matrix[:n, :n] = _border(at.by_z, at.state.macroscopic_gradient()[self.which])
         matrix[:n, n], matrix[n, :n] = self.left, self.right
         side, solved = np.zeros(n + 1), np.empty((2, n + 1))
         side[n] = 1.0
@@ -168,7 +168,7 @@ class _OfFields:
         del at
         return True
 
-    def based(self, at: Linearisation) -> Self:
+    def adapt_to(self, at: Linearisation) -> Self:
         """See :class:`TestFunction`."""
         del at
         return self
@@ -231,7 +231,7 @@ def along(at: Linearisation, direction: Array) -> State:
     return at.state.problem.state(cast("Array", stepped(at.z, direction)))
 
 
-def _bordered(jacobian: Array, gradient: Array) -> Array:
+def _border(jacobian: Array, gradient: Array) -> Array:
     return np.concatenate([jacobian, gradient[None]])
 
 

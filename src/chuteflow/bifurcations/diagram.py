@@ -39,8 +39,8 @@ class DiagramFrame:
     def around(cls, x: Array, y: Array, bounds: tuple[float, float]) -> DiagramFrame:
         """The frame of points, within ``bounds`` of the second parameter: nothing is known beyond."""
         logarithmic = bool(y.min() > 0.0 and y.max() > _SPAN * y.min())
-        low, high = _widened(np.log(y) if logarithmic else y)
-        across = np.clip(_widened(x), *bounds)
+        low, high = _widen(np.log(y) if logarithmic else y)
+        across = np.clip(_widen(x), *bounds)
         return cls(
             (float(across[0]), float(across[1])),
             (float(np.exp(low)), float(np.exp(high))) if logarithmic else (low, high),
@@ -107,7 +107,7 @@ def diagram(found: BoundarySet, quantity: str = "mass_flux") -> Diagram:
     return Diagram(found, quantity, frame, tuple(edges), tuple(regions), tuple(_sides(found, frame, quantity)))
 
 
-def _widened(values: Array) -> tuple[float, float]:
+def _widen(values: Array) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     # One value alone has some extent on an axis too.
     margin = _MARGIN * (high - low) or _MARGIN * max(abs(low), 1e-9)

@@ -25,7 +25,7 @@ _SLIVER = 0.2
 _MOVED = 0.1
 
 
-def pinned(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
+def pin(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
     """A solved flow with the breaks of its grid pinned that lie where it passes kinks of the law."""
     if problem.pins or problem.breaks == WHOLE or not problem.model.kinks.size:
         return problem, z
@@ -36,15 +36,15 @@ def pinned(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
     return replace(problem, pins=tuple(pins)), np.concatenate([z[:-2], np.zeros(len(pins)), z[-2:]])
 
 
-def unpinned(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
+def unpin(problem: Collocation, z: Array) -> tuple[Collocation, Array]:
     """The flow on a grid whose pieces meet where the pinned breaks are, which stay there from now on."""
     if not problem.pins:
         return problem, z
     other = replace(problem, breaks=_places(problem, z), pins=())
-    return other, carried_to(problem, z, other)
+    return other, transfer(problem, z, other)
 
 
-def fitted(problem: Collocation, z: Array, stretch: float | None = None) -> Collocation | None:
+def fit_grid(problem: Collocation, z: Array, stretch: float | None = None) -> Collocation | None:
     """The grid that a flow asks for: with the pieces that meet where it passes kinks of the law now, and of another
     ``stretch``; None where it is on that already."""
     found = _crossings(problem, z)
@@ -66,7 +66,7 @@ def fitted(problem: Collocation, z: Array, stretch: float | None = None) -> Coll
     return Collocation(problem.model, degree, new, whole, pins)
 
 
-def carried_to(problem: Collocation, v: Array, other: Collocation, at: Array | None = None) -> Array:
+def transfer(problem: Collocation, v: Array, other: Collocation, at: Array | None = None) -> Array:
     """Unknowns ``v`` on another grid, or a direction where ``at`` are the unknowns there it is one."""
     nodes, z = len(problem.grid.nodes), v if at is None else at
     target = stretch_position(stretch_map(other.grid.nodes, other.stretch)[0], problem.stretch)

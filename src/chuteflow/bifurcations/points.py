@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chuteflow.bifurcations.grids import unpinned
+from chuteflow.bifurcations.grids import unpin
 from chuteflow.bifurcations.system import BoundarySystem
 from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
@@ -56,9 +56,9 @@ def solve_boundary_point(system: BoundarySystem, w: Array, row: Array, value: fl
     finer_degrees = [degree for degree in DEGREES if degree > system.degree]
     refits = _REFITS
     while finer_degrees:
-        result = newton(lambda w, system=system: _bordered(system, w, row, value), w, tolerance=_STEP, longest_step=2.0)
+        result = newton(lambda w, system=system: _border(system, w, row, value), w, tolerance=_STEP, longest_step=2.0)
         # Where the start is on a grid for other breaks than the flow there passes, Newton's method does not converge.
-        refitted = system.refitted(result.z if result.converged else w) if refits else None
+        refitted = system.refit(result.z if result.converged else w) if refits else None
         if refitted is not None:
             (system, w), refits = refitted, refits - 1
             finer_degrees = [degree for degree in DEGREES if degree > system.degree]
@@ -67,7 +67,7 @@ def solve_boundary_point(system: BoundarySystem, w: Array, row: Array, value: fl
             raise SolveError("a point of a boundary could not be solved: narrow the range searched")
         coarse = _quantities(system, result.z)
         system, w = refine_grid(system, result.z, finer_degrees.pop(0))
-        residual, jacobian = _bordered(system, w, row, value)
+        residual, jacobian = _border(system, w, row, value)
         w = w - solve_each(jacobian, residual)
         change = float(np.abs(_quantities(system, w) - coarse).max())
         noise = _noise(system, w, jacobian)
@@ -79,7 +79,7 @@ def solve_boundary_point(system: BoundarySystem, w: Array, row: Array, value: fl
 def estimate_shift(system: BoundarySystem, w: Array, row: Array) -> float:
     """How far the parameter is from the boundary, by the first step of Newton's method in the plane across ``row``
     (3,) through ``w``; infinitely far where the parameter has no say in it."""
-    residual, jacobian = _bordered(system, w, row, float(row @ w[-3:]))
+    residual, jacobian = _border(system, w, row, float(row @ w[-3:]))
     far = -float(solve_each(jacobian, residual)[-1])
     return far if np.isfinite(far) else np.inf
 
@@ -102,12 +102,12 @@ def make_point(system: BoundarySystem, w: Array, error: float) -> BoundaryPoint:
     """The point of the boundary with solved unknowns ``w``."""
     chute = system.sweep.chute_at(float(w[-1]))
     problem = system.problem(float(w[-1]))
-    problem, z = unpinned(replace(problem, model=replace(problem.model, chute=chute)), w[:-1])
+    problem, z = unpin(replace(problem, model=replace(problem.model, chute=chute)), w[:-1])
     solution = Solution(problem.state(z).macroscopic(), error, SolverStatus.CONVERGED, (problem, z))
     return BoundaryPoint(system, w, Flow(chute, solution), error)
 
 
-def _bordered(system: BoundarySystem, w: Array, row: Array, value: float) -> tuple[Array, Array]:
+def _border(system: BoundarySystem, w: Array, row: Array, value: float) -> tuple[Array, Array]:
     residual, jacobian = system.residual_and_jacobian(w)
     last = np.concatenate([np.zeros(len(w) - 3), row])
     return np.append(residual, row @ w[-3:] - value), np.concatenate([jacobian, last[None]])

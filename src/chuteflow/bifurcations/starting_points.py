@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Inversion, TestFunction
-from chuteflow.bifurcations.grids import carried_to, pinned
+from chuteflow.bifurcations.grids import pin, transfer
 from chuteflow.bifurcations.points import BoundaryPoint, estimate_shift, solve_across, solve_boundary_point
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
 from chuteflow.branches.paths import solve_between
@@ -95,7 +95,7 @@ def find_on_branches(
         samples = [_sample(sweep, condition, value, solution) for solution in _among(branch)]
         if isinstance(condition, Fold):
             for turn in branch.turns(condition.which, tolerance):
-                if followed(turn.point.solution):
+                if may_follow(turn.point.solution):
                     yield _from_flow(sweep, condition, value, turn.point.solution, tolerance)
         else:
             yield from _zeros(sweep, condition, value, samples, tolerance)
@@ -107,10 +107,10 @@ def find_on_branches(
 
 def _among(branch: TracedBranch) -> list[Solution]:
     """The flows of a branch that a grid of a few pieces resolves: boundaries are followed on such."""
-    return [solution for solution in branch.solutions if followed(solution)]
+    return [solution for solution in branch.solutions if may_follow(solution)]
 
 
-def followed(solution: Solution) -> bool:
+def may_follow(solution: Solution) -> bool:
     """Whether boundaries are followed among flows like this one."""
     return len(solution.problem.grid.nodes) <= MOST_NODES
 
@@ -132,7 +132,7 @@ def on_grid_of(
     sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution
 ) -> tuple[BoundarySystem, Array]:
     """The system on the grid of a flow, and the flow on it."""
-    problem, z = pinned(solution.problem, solution.z)
+    problem, z = pin(solution.problem, solution.z)
     w = np.append(z, value)
     return BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w), w
 
@@ -200,8 +200,8 @@ def _near(
     """The point near ``sigma`` of a chord, if there is one."""
     one, other = sorted((first.solution, last.solution), key=lambda s: -len(s.problem.grid.nodes))
     fraction = 1.0 - sigma if one is last.solution else sigma
-    problem, z = pinned(one.problem, one.z)
-    moved = carried_to(other.problem, other.z, problem)
+    problem, z = pin(one.problem, one.z)
+    moved = transfer(other.problem, other.z, problem)
     w = np.append(z + fraction * (moved - z), value)
     system = BoundarySystem(sweep, condition, 0, 0.0).moved(problem, w)
     try:
@@ -277,7 +277,7 @@ def _same(p: BoundaryPoint, q: BoundaryPoint) -> bool:
 
 
 def _sample(sweep: SecondParameter, condition: TestFunction, value: float, solution: Solution) -> _SampledFlow:
-    problem, z = pinned(solution.problem, solution.z)
+    problem, z = pin(solution.problem, solution.z)
     stretch = float(np.reshape(problem.stretch, ()))
     system = BoundarySystem(sweep, condition, problem.degree, stretch, problem.breaks, problem.pins)
     at = system.local(np.append(z, value))

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from chuteflow.bifurcations.conditions import Linearisation, TestFunction
-from chuteflow.bifurcations.grids import carried_to, fitted
+from chuteflow.bifurcations.grids import fit_grid, transfer
 from chuteflow.numerics.chebyshev import Array, tail
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import WHOLE, Collocation
@@ -130,34 +130,34 @@ class BoundarySystem:
             residual[-1], jacobian[-1, :-1], jacobian[-1, -1] = self.condition(at)
         return residual, jacobian
 
-    def adapted(self, w: Array, tangent: Array) -> tuple[BoundarySystem, Array, Array] | None:
+    def adapt(self, w: Array, tangent: Array) -> tuple[BoundarySystem, Array, Array] | None:
         """Another grid or stretch where the flow asks for it, and other borders where the condition does."""
         problem, z = self.problem(float(w[-1])), w[:-1]
-        other = _suited(problem, z)
+        other = _choose_grid(problem, z)
         if other is None:
             at = self.local(w)
             if self.condition.suits(at):
                 return None
-            return replace(self, condition=self.condition.based(at)), w, tangent
-        moved = np.append(carried_to(problem, z, other), w[-1])
-        direction = np.append(carried_to(problem, tangent[:-1], other, z), tangent[-1])
+            return replace(self, condition=self.condition.adapt_to(at)), w, tangent
+        moved = np.append(transfer(problem, z, other), w[-1])
+        direction = np.append(transfer(problem, tangent[:-1], other, z), tangent[-1])
         return self.moved(other, moved), moved, direction
 
-    def refitted(self, w: Array) -> tuple[BoundarySystem, Array] | None:
+    def refit(self, w: Array) -> tuple[BoundarySystem, Array] | None:
         """The system on pieces that meet where the flow passes kinks of the law now, and the point there; None where it
         is that already."""
         problem = self.problem(float(w[-1]))
-        other = fitted(problem, w[:-1])
+        other = fit_grid(problem, w[:-1])
         if other is None:
             return None
-        moved = np.append(carried_to(problem, w[:-1], other), w[-1])
+        moved = np.append(transfer(problem, w[:-1], other), w[-1])
         return self.moved(other, moved), moved
 
     def moved(self, problem: Collocation, w: Array) -> BoundarySystem:
         """The system on the grid of ``problem``, where ``w`` is about the solution."""
         stretch = float(np.reshape(problem.stretch, ()))
         other = replace(self, degree=problem.degree, stretch=stretch, breaks=problem.breaks, pins=problem.pins)
-        return replace(other, condition=self.condition.based(other.local(w)))
+        return replace(other, condition=self.condition.adapt_to(other.local(w)))
 
     def tangent(self, w: Array) -> Array:
         """The null vector (n+4,) of the Jacobian, of length 1 in the inner product."""
@@ -168,7 +168,7 @@ class BoundarySystem:
         return v[-1] / root
 
 
-def _suited(problem: Collocation, z: Array) -> Collocation | None:
+def _choose_grid(problem: Collocation, z: Array) -> Collocation | None:
     """A finer or coarser grid, or another stretch, or other breaks, where the flow asks for it."""
     state = problem.state(z)
     decay = tail(problem.grid, state.y + 1e-30)
@@ -179,7 +179,7 @@ def _suited(problem: Collocation, z: Array) -> Collocation | None:
         place -= 1
     stretch = default_stretch(problem.model, float(state.mass[0]), float(np.exp(state.surface)))
     off = abs(stretch - problem.stretch) >= _STRETCH_OFF
-    other = fitted(problem, z, stretch if off else None)
+    other = fit_grid(problem, z, stretch if off else None)
     if other is None:
         return None if DEGREES[place] == problem.degree else replace(problem, degree=DEGREES[place])
     return replace(other, degree=DEGREES[place]) if other.breaks == problem.breaks == WHOLE else other

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow.bifurcations.conditions import Fold, InteriorChange, Linearisation, along
 from chuteflow.bifurcations.edges import find_exit
-from chuteflow.bifurcations.grids import carried_to
+from chuteflow.bifurcations.grids import transfer
 from chuteflow.bifurcations.points import BoundaryPoint, make_point, refine_grid, solve_boundary_point
 from chuteflow.bifurcations.starting_points import HELD
 from chuteflow.bifurcations.system import BoundarySystem, SecondParameter
@@ -106,14 +106,14 @@ class TracedBoundary:
         for i in np.flatnonzero((off[1:] >= 0.0) != (off[:-1] >= 0.0)).tolist():
             one, other = stops[i][1], stops[i + 1][1]
             fraction = off[i] / (off[i] - off[i + 1])
-            w = one.w + fraction * (_carried(other.w, other.system, one.system) - one.w)
+            w = one.w + fraction * (_transfer(other.w, other.system, one.system) - one.w)
             out.append(solve_boundary_point(one.system, w, HELD, value, tolerance))
         return out
 
     def _meets(self, i: int, sigma: float, point: BoundaryPoint, close: bool) -> bool:
         """Whether the point is on chord i, at ``sigma``; ``close`` says so where no point there can be solved."""
         one, other = self.points[i], self.points[i + 1]
-        system, w = one.system, one.w + sigma * (_carried(other.w, other.system, one.system) - one.w)
+        system, w = one.system, one.w + sigma * (_transfer(other.w, other.system, one.system) - one.w)
         row = np.array([1.0, 1.0, self.sweep.weight]) * (other.w[-3:] - one.w[-3:])
         try:
             there = solve_boundary_point(system, w, row, float(row @ point.w[-3:]), _ROUGHLY)
@@ -141,9 +141,9 @@ def _side(start: BoundaryPoint, tangent: Array, settings: BoundaryTracing) -> Si
     side = Side(start)
     kinked = start.system.problem(start.value).model.kinks.size > 0
     for leaps in range(_LEAPS):
-        lost = _followed(side, start, tangent, settings, closes=leaps == 0)
+        lost = _follow(side, start, tangent, settings, closes=leaps == 0)
         # Just where the flow comes to a break of the law, or leaves it, neither grid serves.
-        leapt = _leapt(side, settings) if lost and kinked else None
+        leapt = _leap(side, settings) if lost and kinked else None
         if leapt is None:
             break
         start, tangent = leapt
@@ -151,7 +151,7 @@ def _side(start: BoundaryPoint, tangent: Array, settings: BoundaryTracing) -> Si
     return side
 
 
-def _followed(
+def _follow(
     side: Side[BoundaryPoint], start: BoundaryPoint, tangent: Array, settings: BoundaryTracing, *, closes: bool
 ) -> bool:
     """Follow a side from ``start`` on; whether it was lost before it came to an end. It ``closes`` where it comes to
@@ -185,7 +185,7 @@ def _followed(
     return bool(lost) or path.status.failed
 
 
-def _leapt(side: Side[BoundaryPoint], settings: BoundaryTracing) -> tuple[BoundaryPoint, Array] | None:
+def _leap(side: Side[BoundaryPoint], settings: BoundaryTracing) -> tuple[BoundaryPoint, Array] | None:
     """A point a little further on than a side leads, and the tangent there, if there is one in about its direction."""
     if len(side.points) < 2:
         return None
@@ -193,7 +193,7 @@ def _leapt(side: Side[BoundaryPoint], settings: BoundaryTracing) -> tuple[Bounda
     system = last.system
     root = np.sqrt(system.weights[-3:])
     tangent = system.tangent(last.w)
-    tangent *= np.sign((root**2 * tangent[-3:]) @ (last.w - _carried(before.w, before.system, system))[-3:])
+    tangent *= np.sign((root**2 * tangent[-3:]) @ (last.w - _transfer(before.w, before.system, system))[-3:])
     tangent /= float(np.linalg.norm(root * tangent[-3:]))
     for step in _LEAP:
         w = last.w + step * tangent
@@ -231,17 +231,17 @@ def _extend(
         side.stop(end)
         return
     _add_turn(side, before, point, tolerance)
-    if first is not None and len(side.points) > 3 and _returned(first, before, point):
+    if first is not None and len(side.points) > 3 and _has_returned(first, before, point):
         side.stop("the boundary closes on itself", closed=True)
         return
     row = (point.system.weights * point.tangent)[-3:]
     found = solve_boundary_point(point.system, point.z, row, float(row @ point.z[-3:]), tolerance)
-    if point.system.pins and _turned_back(side, found):
+    if point.system.pins and _turns_back(side, found):
         raise SolveError("a boundary turns back where its flows come to a break of the law")
     side.add(found)
 
 
-def _turned_back(side: Side[BoundaryPoint], point: BoundaryPoint) -> bool:
+def _turns_back(side: Side[BoundaryPoint], point: BoundaryPoint) -> bool:
     """Whether the way to a point leads back against that to the last one."""
     if len(side.points) < 2:
         return False
@@ -276,7 +276,7 @@ def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], toleranc
     for degree in DEGREES[DEGREES.index(a.system.degree) :]:
         if degree > a.system.degree:
             system, w = refine_grid(a.system, a.z, degree)
-            a, b = _corrected(system, w, a), _corrected(system, refine_grid(b.system, b.z, degree)[1], b)
+            a, b = _correct(system, w, a), _correct(system, refine_grid(b.system, b.z, degree)[1], b)
         if a.tangent[-1] * b.tangent[-1] >= 0.0:
             raise SolveError("a turning point of a boundary is not there on a finer grid")
         located = locate(a, b, a.system, lambda z, tangent, system: float(tangent[-1]))
@@ -293,7 +293,7 @@ def _turn(a: CurvePoint[BoundarySystem], b: CurvePoint[BoundarySystem], toleranc
     raise SolveError("the finest grid did not resolve a turning point: ask for a larger tolerance")
 
 
-def _corrected(system: BoundarySystem, w: Array, near: CurvePoint[BoundarySystem]) -> CurvePoint[BoundarySystem]:
+def _correct(system: BoundarySystem, w: Array, near: CurvePoint[BoundarySystem]) -> CurvePoint[BoundarySystem]:
     """A point of another grid that lies where ``near`` does."""
     direction = np.zeros_like(w)
     direction[-3:] = (near.system.weights * near.tangent)[-3:]
@@ -326,7 +326,7 @@ def _definite(at: Linearisation) -> bool:
     return bool(np.linalg.det(hessian) > 0.0)
 
 
-def _returned(
+def _has_returned(
     first: CurvePoint[BoundarySystem], before: CurvePoint[BoundarySystem], last: CurvePoint[BoundarySystem]
 ) -> bool:
     """Whether the last step passed the first point, in its direction, as far as the last three unknowns show."""
@@ -340,11 +340,11 @@ def _returned(
     return 0.0 <= fraction < 1.0 and beside < _CLOSE and cosine > _ALONG
 
 
-def _carried(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:
+def _transfer(w: Array, system: BoundarySystem, other: BoundarySystem) -> Array:
     """Unknowns on the grid of another system."""
     value = float(w[-1])
     if (system.degree, system.stretch, system.breaks, system.pins) == (
         other.degree, other.stretch, other.breaks, other.pins,
     ):  # fmt: skip
         return w
-    return np.append(carried_to(system.problem(value), w[:-1], other.problem(value)), value)
+    return np.append(transfer(system.problem(value), w[:-1], other.problem(value)), value)

@@ -30,7 +30,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of, rough_kinds
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Solution, check_tolerance
 from chuteflow.threads import on_one_thread
 
 #: Quantities whose folds are located, and others at whose zeros a flow changes its kind.
@@ -70,7 +70,7 @@ def curve(
             its branch ends, and says why.
     """
     points = whole("points", points, 2, 100_000)
-    tolerance = checked_tolerance(tolerance)
+    tolerance = check_tolerance(tolerance)
     within = SearchRange.checked(surface_temperature, largest_holdup, chute.surface)
     problem = model(chute)
     found, lost = trace_all(problem, within, tolerance)

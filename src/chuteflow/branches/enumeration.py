@@ -31,7 +31,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, flows_of
 from chuteflow.steady.model import Model, model
-from chuteflow.steady.solver import TOLERANCE, Solution, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Solution, check_tolerance
 from chuteflow.threads import on_one_thread
 from chuteflow.trajectories.refining import TrajectoryGrid
 
@@ -122,7 +122,7 @@ def flows(
 @np.errstate(under="ignore")
 def flows_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> FlowSet:
     """The flows at which the quantity ``which`` has a ``value``, as :func:`flows`, searched for in a range."""
-    tolerance = checked_tolerance(tolerance)
+    tolerance = check_tolerance(tolerance)
     problem = model(chute)
     found = _search_and_extend(problem, which, value, tolerance, within)
     return FlowSet(
@@ -133,7 +133,7 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
         reason=None
         if found.solutions
         else explain_none_found(problem, [f.macroscopic for f in found.branches], which, value, found.within),
-        incomplete=_left_out(found, which, value),
+        incomplete=_explain_left_out(found, which, value),
     )
 
 
@@ -141,7 +141,7 @@ def flows_within(chute: Chute, which: int, value: float, tolerance: float, withi
 @np.errstate(under="ignore")
 def solve_within(chute: Chute, which: int, value: float, tolerance: float, within: SearchRange) -> tuple[Flow, ...]:
     """The flows of :func:`flows_within` alone: for very many chutes, of which nothing else is asked."""
-    found = _search_and_extend(model(chute), which, value, checked_tolerance(tolerance), within)
+    found = _search_and_extend(model(chute), which, value, check_tolerance(tolerance), within)
     return tuple(flows_of(chute, found.solutions))
 
 
@@ -232,7 +232,7 @@ def _leads(search: _BranchSearch, which: int, value: float) -> Iterator[_Extrapo
                     yield _Extrapolation(axis, edge, float(end[axis]) + 1.2 * left / slope + edge)
 
 
-def _left_out(found: _BranchSearch, which: int, value: float) -> str | None:
+def _explain_left_out(found: _BranchSearch, which: int, value: float) -> str | None:
     """What the search leaves open, in words: also branches not followed to where they may have the value."""
     left = explain_incompleteness(found.grid, found.within, found.lost, ("a flow", "flows"), which, value, found.unsure)
     if left is not None:

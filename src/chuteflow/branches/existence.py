@@ -24,8 +24,8 @@ def explain_none_found(model: Model, branches: Sequence[Array], which: int, valu
         spans = [np.exp([_least(f, f[:, which]), -_least(f, -f[:, which])]) for f in branches]
         ranges = " and ".join(f"{low:.3g} to {high:.3g}" for low, high in sorted(map(tuple, spans)))
         name = _NAMES[which]
-        return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_searched(within)})"
-    return f"{explain_imbalance(model)} ({_searched(within)})"
+        return f"no flow has {name} = {value:g}: those of this chute have about {ranges} ({_describe_range(within)})"
+    return f"{explain_imbalance(model)} ({_describe_range(within)})"
 
 
 def _least(places: Array, values: Array) -> float:
@@ -76,7 +76,7 @@ def explain_imbalance(model: Model) -> str:
     return "no flow balances the energy gained and lost"
 
 
-def _searched(within: SearchRange) -> str:
+def _describe_range(within: SearchRange) -> str:
     return (
         f"searched: surface temperatures {within.coldest:.3g} to {within.hottest:.3g}, hold-ups to {within.deepest:.3g}"
     )

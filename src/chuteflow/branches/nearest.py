@@ -106,7 +106,7 @@ def nearest(
     if condition:
         (quantity,) = condition
         which, value = check_condition(given)
-        looked_for = _Target(within.restricted(which, value), which, value)
+        looked_for = _Target(within.restrict(which, value), which, value)
         near = _nearest_value(chute, which, value, within)
     found: dict[str, float | None] = {}
     examined: dict[str, tuple[float, float]] = {}

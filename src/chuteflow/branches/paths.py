@@ -282,7 +282,7 @@ def _turns(chord: Chord, which: int, unknown: float) -> Iterator[tuple[float, Pa
         if chord.length < _SHORTEST:
             return
     elif not small and (chord.length < _SHORTEST or (unknown < _KNOWN and not 0.0 < turning < 1.0)):
-        yield _located(chord, lambda point: (float(chord.sharp_slope(point)[which]), None), (begin, end))
+        yield _locate(chord, lambda point: (float(chord.sharp_slope(point)[which]), None), (begin, end))
         return
     middle = _halfway(chord)
     at = chord.place(middle.m)
@@ -301,17 +301,17 @@ def find_value(chord: Chord, which: int, target: float, close: float) -> tuple[f
     def off(point: PathPoint) -> tuple[float, float | None]:
         return float(point.m[which]) - target, float(chord.slope(point)[which])
 
-    return _located(chord, off, (off(chord.first)[0], off(chord.last)[0]), close)
+    return _locate(chord, off, (off(chord.first)[0], off(chord.last)[0]), close)
 
 
 def find_zero(
     chord: Chord, function: Callable[[Solution], float], ends: tuple[float, float]
 ) -> tuple[float, PathPoint]:
     """Where ``function`` of the flow vanishes along the chord, given its values of opposite sign at the ends."""
-    return _located(chord, lambda point: (function(point.solution), None), ends)
+    return _locate(chord, lambda point: (function(point.solution), None), ends)
 
 
-def _located(
+def _locate(
     chord: Chord,
     function: Callable[[PathPoint], tuple[float, float | None]],
     ends: tuple[float, float],

@@ -85,7 +85,7 @@ class SearchRange:
             hottest=min(max(self.hottest, value), WIDEST[1]),
         )
 
-    def restricted(self, which: int, value: float) -> SearchRange:
+    def restrict(self, which: int, value: float) -> SearchRange:
         """The part of the range in which all flows lie at which the quantity ``which`` has a ``value``: no deeper than
         a given hold-up, and with trajectories no further than to a given flux, but for a margin."""
         if which == LOG_M:

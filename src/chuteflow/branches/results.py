@@ -54,9 +54,9 @@ class FlowSet(Result, Sequence[Flow]):
     incomplete: str | None = None
 
     def __repr__(self) -> str:
-        temperatures = display.listed([flow.surface_temperature for flow in self.flows])
+        temperatures = display.list_numbers([flow.surface_temperature for flow in self.flows])
         found = f"T_surface = {temperatures}" if self.flows else self.reason
-        return display.line("FlowSet", display.counted(len(self), "flow"), found)
+        return display.line("FlowSet", display.count_of(len(self), "flow"), found)
 
     def _repr_html_(self) -> str:
         header = ["", "name", *(NUMBERS[name].symbol for name in PLACE), "density", "interior", "validity", "error"]
@@ -67,7 +67,7 @@ class FlowSet(Result, Sequence[Flow]):
             ]
             for i, flow in enumerate(self, 1)
         ]
-        caption = f"{display.counted(len(self), 'flow')} on {self.chute.summary}"
+        caption = f"{display.count_of(len(self), 'flow')} on {self.chute.summary}"
         return display.html_table(caption, header, rows, _advice(self.reason))
 
     def __len__(self) -> int:
@@ -94,7 +94,7 @@ class FlowSets(Result, Sequence[FlowSet]):
     sets: tuple[FlowSet, ...]
 
     def __repr__(self) -> str:
-        values = f"{self.quantity} = {display.listed(self.values)}"
+        values = f"{self.quantity} = {display.list_numbers(self.values)}"
         numbers = ", ".join(str(len(one)) for one in self.sets[:20]) + (", ..." if len(self.sets) > 20 else "")
         return display.line("FlowSets", values, f"{numbers} flows")
 
@@ -151,9 +151,9 @@ class Branch(Result, LineOfFlows):
     ends: tuple[str, str]
 
     def __repr__(self) -> str:
-        found = display.counted(len(self.special), "special point")
+        found = display.count_of(len(self.special), "special point")
         reach = (display.span("Q", self.mass_flux), display.span("T_surface", self.surface_temperature))
-        return display.line("Branch", f"{display.counted(len(self.flows), 'flow')}, {found}", *reach)
+        return display.line("Branch", f"{display.count_of(len(self.flows), 'flow')}, {found}", *reach)
 
     def _repr_html_(self) -> str:
         return display.html_table(repr(self)[1:-1], ["", *(NUMBERS[name].symbol for name in PLACE)], _stations(self))
@@ -199,8 +199,8 @@ class Curve(Result):
         )
 
     def __repr__(self) -> str:
-        branches = display.counted(len(self.branches), "branch", "branches")
-        total = display.counted(sum(len(branch.flows) for branch in self.branches), "flow")
+        branches = display.count_of(len(self.branches), "branch", "branches")
+        total = display.count_of(sum(len(branch.flows) for branch in self.branches), "flow")
         reach = [
             display.span(NUMBERS[name].symbol, np.concatenate([getattr(branch, name) for branch in self.branches]))
             for name in ("mass_flux", "surface_temperature")
@@ -211,7 +211,7 @@ class Curve(Result):
     def _repr_html_(self) -> str:
         header = ["branch", "", *(NUMBERS[name].symbol for name in PLACE)]
         rows = [[str(i), *row] for i, branch in enumerate(self.branches, 1) for row in _stations(branch)]
-        branches = display.counted(len(self.branches), "branch", "branches")
+        branches = display.count_of(len(self.branches), "branch", "branches")
         return display.html_table(f"{branches} of flows on {self.chute.summary}", header, rows, _advice(self.reason))
 
 

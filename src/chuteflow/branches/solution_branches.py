@@ -140,7 +140,7 @@ class SolutionBranch:
             return None
         return point
 
-    def _solved_near(self, places: list[int], tolerance: float) -> list[PathPoint]:
+    def _solve_near(self, places: list[int], tolerance: float) -> list[PathPoint]:
         """The flows at some rough ones in order, without those that lead nowhere."""
         found: list[PathPoint] = []
         for i in places:
@@ -186,7 +186,9 @@ class SolutionBranch:
         begin, first = tried([i for k in _OTHERS if 0 <= (i := begin + sign * k) <= middle], -1.0)
         sign = 1 if end < whole else -1
         end, last = tried([i for k in _OTHERS if middle < (i := end + sign * k) <= whole], 1.0)
-        inner = [p for p in self._solved_near(self._spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)]
+        inner = [
+            p for p in self._solve_near(self._choose_spaced(begin, end)[1:-1], tolerance) if not _is_behind(p, first)
+        ]
         while inner and _is_behind(last, inner[-1]):
             inner.pop()
         return refine_path([first, *inner, last], tolerance)
@@ -197,7 +199,7 @@ class SolutionBranch:
         Raises:
             SolveError: where the branch could not be followed.
         """
-        found = self._solved_near(self._spaced(begin, end), tolerance)
+        found = self._solve_near(self._choose_spaced(begin, end), tolerance)
         if len(found) < 2:
             raise SolveError("a branch seen in the search could not be solved: ask for a larger tolerance")
         return refine_path(found, tolerance)
@@ -207,7 +209,7 @@ class SolutionBranch:
         inside = np.flatnonzero([self.within.contains(m) for m in self.macroscopic])
         if len(inside) < 2:
             return []
-        found = self._solved_near(self._spaced(int(inside[0]), int(inside[-1])), tolerance)
+        found = self._solve_near(self._choose_spaced(int(inside[0]), int(inside[-1])), tolerance)
         if self.rough.closed and len(inside) == len(self.macroscopic) and found:
             while len(found) > 1 and _is_behind(found[0], found[-1]):
                 found.pop()
@@ -229,7 +231,7 @@ class SolutionBranch:
             if len(piece) > 1
         ]
 
-    def _spaced(self, begin: int, end: int) -> list[int]:
+    def _choose_spaced(self, begin: int, end: int) -> list[int]:
         """Rough flows from ``begin`` to ``end`` at some distance from each other, closer where the branch turns."""
         length = self.arclength
         spacing = np.where(self.macroscopic[:, LOG_M] > np.log(_DEEP), _SPACING_DEEP, _SPACING)

@@ -172,12 +172,12 @@ def _described(command: Command) -> Command:
 
     @wraps(command)
     def described(**given: Any) -> Any:
-        return command(**_filled(given))
+        return command(**_fill_in(given))
 
     return described  # pyright: ignore[reportReturnType]
 
 
-def _filled(given: dict[str, Any]) -> dict[str, Any]:
+def _fill_in(given: dict[str, Any]) -> dict[str, Any]:
     found = _case(given["chute_file"], given["case"])
     if isinstance(given["angle"], tuple):
         given = _with_slopes(given)
@@ -235,7 +235,7 @@ def _case(path: str | None, name: str | None) -> Case | None:
         raise InputError(f"{CASE_VARIABLE}: {error}") from None
 
 
-def _completed_case(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+def _complete_case(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
     from chuteflow.steady.cases import CASES
 
     return [name for name in CASES if name.startswith(incomplete)]
@@ -246,7 +246,7 @@ case_options = _options(
     option(
         "--case",
         metavar="NAME",
-        shell_complete=_completed_case,
+        shell_complete=_complete_case,
         help="A chute or material of `chuteflow cases`; options override it. "
         f"Where neither is given, ${CASE_VARIABLE} may name one.",
     ),
@@ -462,9 +462,9 @@ def words(given: Mapping[str, Any]) -> dict[str, str]:
     """
     found = {name: given[name] for name in ("surface", "closure", "base") if given.get(name) is not None}
     if given["settings"]:
-        from chuteflow.theory.laws import settings_added
+        from chuteflow.theory.laws import add_settings
 
-        found["closure"] = settings_added(found.get("closure", "lun"), given["settings"])
+        found["closure"] = add_settings(found.get("closure", "lun"), given["settings"])
     return found
 
 
@@ -517,7 +517,7 @@ def condition(given: Mapping[str, Any], chute: Chute, scales: Scales | None) -> 
     if not named:
         raise InputError("missing one of --flux, --holdup, --centre-of-mass and --temperature, for example --flux 3")
     if len(named) > 1:
-        both = " and ".join(f"{_written(name)} {given[name]}" for name in named)
+        both = " and ".join(f"{_spell(name)} {given[name]}" for name in named)
         raise InputError(f"{both}: give one of --flux, --holdup, --centre-of-mass and --temperature, and no other")
     chosen = _CONDITIONS[named[0]]
     return {chosen.key: amount(given, chosen.option, chosen.quantity, chute.slope, scales)}
@@ -535,12 +535,12 @@ def amount(given: Mapping[str, Any], name: str, quantity: str, slope: float, sca
     from chuteflow.steady.quantities import SCALED
 
     text = str(given[name])
-    value = read_amount(_written(name), text, quantity, scales, slope)
+    value = read_amount(_spell(name), text, quantity, scales, slope)
     if scales is not None and bare(text):
         unit = SCALED[quantity].unit
         note(
-            f"{_written(name)} {text} is taken as dimensionless, {value * scales.factor(quantity, slope):.5g} {unit} "
-            f'here; in SI units write {_written(name)} "{text} {unit}"'
+            f"{_spell(name)} {text} is taken as dimensionless, {value * scales.factor(quantity, slope):.5g} {unit} "
+            f'here; in SI units write {_spell(name)} "{text} {unit}"'
         )
     return value
 
@@ -556,10 +556,10 @@ def own(given: Mapping[str, Any], name: str, quantity: str, slope: float | None,
     if not isinstance(typed, NumbersWithUnit):
         return typed
     if slope is None:
-        raise InputError(f"{_written(name)} {typed}: a unit needs one slope, and --slope is a range: omit the unit")
+        raise InputError(f"{_spell(name)} {typed}: a unit needs one slope, and --slope is a range: omit the unit")
     from chuteflow.io.units import read_amount
 
-    values = [read_amount(_written(name), f"{one} {typed.unit}", quantity, scales, slope) for one in typed.texts]
+    values = [read_amount(_spell(name), f"{one} {typed.unit}", quantity, scales, slope) for one in typed.texts]
     return values[0] if len(values) == 1 else tuple(values)
 
 
@@ -575,7 +575,7 @@ def is_quiet() -> bool:
     return context is not None and bool(context.params.get("quiet"))
 
 
-def _written(name: str) -> str:
+def _spell(name: str) -> str:
     """A parameter of a command as it is typed."""
     return f"--{name.replace('_', '-')}"
 
@@ -708,7 +708,7 @@ def deliver(
         from chuteflow.plotting.plots import write_figure
 
         with style.own_settings():
-            drawn = style.themed(figure(), given.get("theme") or "print")
+            drawn = style.apply_theme(figure(), given.get("theme") or "print")
             for one in picture_files(path):
                 write_figure(drawn, one)
 

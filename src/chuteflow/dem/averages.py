@@ -62,12 +62,12 @@ class Sums:
 
     def mean(self) -> Sums:
         """The mean over all blocks, as one block."""
-        return self._mapped(lambda values: values.mean(axis=0, keepdims=True))
+        return self._map(lambda values: values.mean(axis=0, keepdims=True))
 
     def without_each(self) -> Iterator[Sums]:
         """The means over all blocks but one, each block left out once, in their order."""
         count = len(self.mass)
-        whole = self._mapped(lambda values: values.sum(axis=0))
+        whole = self._map(lambda values: values.sum(axis=0))
         for block in range(count):
             parts = {
                 field.name: ((getattr(whole, field.name) - getattr(self, field.name)[block]) / (count - 1))[None]
@@ -75,7 +75,7 @@ class Sums:
             }
             yield Sums(**parts)
 
-    def _mapped(self, change: Callable[[Array], Array]) -> Sums:
+    def _map(self, change: Callable[[Array], Array]) -> Sums:
         return Sums(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
 
 

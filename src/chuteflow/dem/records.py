@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from chuteflow import __version__
-from chuteflow.checks import number, number_in, shown
+from chuteflow.checks import number, number_in, shorten
 from chuteflow.dem.averages import tenths_of
 from chuteflow.dem.measured import FIELDS, NUMBERS, Measured
 from chuteflow.dem.output import Array
@@ -97,18 +97,18 @@ def _dataset(measured: Measured, history: str) -> Dataset:
     told = {"units": "1", "long_name": "fraction of the hold-up above, middle of a tenth"}
     variables["tenth"] = Variable(("tenth",), np.arange(1, 10) / 10.0 + 0.05, told)
     for name, values in measured.fields.items():
-        variables |= _described(name, ("height",), values, measured.errors.get(name), FIELDS[name])
+        variables |= _describe(name, ("height",), values, measured.errors.get(name), FIELDS[name])
     for name, values in measured.tenths.items():
-        variables |= _described(f"mean_{name}", ("tenth",), values, measured.tenth_errors.get(name), FIELDS[name])
+        variables |= _describe(f"mean_{name}", ("tenth",), values, measured.tenth_errors.get(name), FIELDS[name])
     for name, value in measured.numbers.items():
-        variables |= _described(name, (), value, measured.number_errors.get(name), NUMBERS[name])
+        variables |= _describe(name, (), value, measured.number_errors.get(name), NUMBERS[name])
     for name, one in measured.drifts.items():
         about = ("", f"change of {name} over 300 time units, as a fraction of its mean")
-        variables |= _described(f"{_DRIFT}{name}", (), one.value, one.error, about)
+        variables |= _describe(f"{_DRIFT}{name}", (), one.value, one.error, about)
     return Dataset(variables, attributes)
 
 
-def _described(
+def _describe(
     name: str, dimensions: tuple[str, ...], values: Any, errors: Any, about: tuple[str, str]
 ) -> dict[str, Variable]:
     """A variable, and that of its standard errors where they are known."""
@@ -206,7 +206,7 @@ def _from_csv(path: Path) -> Measured:
     for name in ("slope", "e"):
         if name not in heads:
             raise InputError(f'it does not say {name}: write a line such as "# {name} = 0.18" at its beginning')
-    return _completed(heads, columns)
+    return _complete(heads, columns)
 
 
 def _columns(rows: list[list[str]]) -> dict[str, Array]:
@@ -220,7 +220,7 @@ def _columns(rows: list[list[str]]) -> dict[str, Array]:
         raise InputError("two columns have one name")
     for name in names:
         if name.removesuffix(_ERROR) not in ("height", *FIELDS):
-            raise InputError(f"unknown column {shown(name)}: choose from height, {', '.join(FIELDS)}")
+            raise InputError(f"unknown column {shorten(name)}: choose from height, {', '.join(FIELDS)}")
     missing = [name for name in _NEEDED if name not in names]
     if missing:
         raise InputError(f"the columns {', '.join(missing)} are missing")
@@ -237,7 +237,7 @@ def _value(name: str, cell: str) -> float:
     return math.nan if cell.strip().lower() in ("", "nan") else number_in(name, cell)
 
 
-def _completed(heads: Mapping[str, str], columns: dict[str, Array]) -> Measured:
+def _complete(heads: Mapping[str, str], columns: dict[str, Array]) -> Measured:
     """A measured flow of what a file says, with the overburden, the hold-up and the flux from the profiles where they
     are not given."""
     z, nu, u = columns["height"], columns["volume_fraction"], columns["velocity"]

@@ -84,7 +84,7 @@ def read_folder(folder: str | os.PathLike[str], closures: Sequence[str] = CLOSUR
         yield StudyResult(file.stem, compare(records.load(file), closures, conditions=("M",)))
 
 
-def thinned(measured: Measured, heights: int = HEIGHTS) -> Measured:
+def thin(measured: Measured, heights: int = HEIGHTS) -> Measured:
     """``measured`` at fewer heights, spread evenly over the overburden; the means over tenths stay the same."""
     fraction = measured.fraction_above
     wanted = np.linspace(float(np.nanmax(fraction)), max(float(np.nanmin(fraction)), 0.02), heights)

@@ -105,7 +105,7 @@ def prepare(folder: str | os.PathLike[str], scene: Scene, schedule: Schedule) ->
         raise InputError(f"cannot write {folder}: {error.strerror or error}") from None
     if others:
         raise InputError(f"{folder} is not empty and holds no run: name another folder")
-    needed, free = script.bytes_written(scene, schedule), shutil.disk_usage(path).free
+    needed, free = script.estimate_bytes(scene, schedule), shutil.disk_usage(path).free
     if needed + _SPARE > free:
         raise InputError(
             f"the run would write about {needed / 1e6:.0f} MB into {folder}, where {free / 1e6:.0f} MB are free and "
@@ -155,9 +155,9 @@ def go_on(run: Run, processes: int = 1) -> Generator[Moment, None, None]:
         chosen = engine(processes)
         states = _states(run.folder)
         for number, state in enumerate(states or [None]):
-            arguments = _resumed(run, state) if state else _from_start(run)
+            arguments = _resume(run, state) if state else _from_start(run)
             try:
-                yield from _watched(run, chosen, arguments)
+                yield from _watch(run, chosen, arguments)
                 return
             except _StateError:
                 if number + 1 == max(len(states), 1):
@@ -182,12 +182,12 @@ def _from_start(run: Run) -> list[str]:
     return ["-in", script.START]
 
 
-def _resumed(run: Run, state: Path) -> list[str]:
+def _resume(run: Run, state: Path) -> list[str]:
     trim(run.folder, script.WRITTEN)
     return ["-in", script.RESUME, "-var", "from", state.name]
 
 
-def _watched(run: Run, chosen: Engine, arguments: list[str]) -> Iterator[Moment]:
+def _watch(run: Run, chosen: Engine, arguments: list[str]) -> Iterator[Moment]:
     command = [*chosen.command, *arguments, "-log", script.LOG]
     steps = run.steps
     lines: deque[str] = deque(maxlen=_KEPT)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.checks import number, shown, whole
+from chuteflow.checks import number, shorten, whole
 from chuteflow.dem.contacts import MASS, Bounds, Contacts, contacts_for
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
@@ -83,12 +83,12 @@ class Scene:
             object.__setattr__(self, name, value)
 
         put("holdup", number("hold-up M", self.holdup, 0.05, 100.0))
-        put("box", _checked_box(self.box))
+        put("box", _check_box(self.box))
         for name, low, high in (("bump_diameter", 0.3, 3.0), ("friction", 0.0, 2.0), ("velocity", -1e3, 1e3)):
             put(name, number(name.replace("_", " "), getattr(self, name), low, high))
         for name, allowed in (("base", BASES), ("start", STARTS)):
             if getattr(self, name) not in allowed:
-                raise InputError(f"unknown {name} {shown(getattr(self, name))}: choose one of {', '.join(allowed)}")
+                raise InputError(f"unknown {name} {shorten(getattr(self, name))}: choose one of {', '.join(allowed)}")
         default = _HOT if self.start == "hot" else _COLD
         given = default if self.temperature is None else self.temperature
         put("temperature", number("temperature", given, 1e-3, 1e3))
@@ -219,11 +219,11 @@ class Scene:
             raise InputError("this is no scene of chuteflow") from None
 
 
-def _checked_box(box: Any) -> tuple[float, float]:
+def _check_box(box: Any) -> tuple[float, float]:
     try:
         length, width = box
     except (TypeError, ValueError):
-        raise InputError(f"box = {shown(box)}: give length and width, such as 12x12") from None
+        raise InputError(f"box = {shorten(box)}: give length and width, such as 12x12") from None
     return number("length of the box", length, 3.0, 1e4), number("width of the box", width, 3.0, 1e4)
 
 
@@ -239,10 +239,10 @@ def bump_positions(scene: Scene) -> Array:
     x = (i + 0.25 + 0.5 * k) * math.sqrt(3.0) * spacing
     y = (j + 0.25 + 0.5 * k) * spacing
     lattice = np.column_stack([x.ravel(), y.ravel()])
-    return lattice if scene.base == "triangular" else _shuffled(scene, lattice)
+    return lattice if scene.base == "triangular" else _shuffle(scene, lattice)
 
 
-def _shuffled(scene: Scene, lattice: Array) -> Array:
+def _shuffle(scene: Scene, lattice: Array) -> Array:
     """Hard discs in random positions: Monte Carlo moves from a lattice, without overlap."""
     random = np.random.default_rng([scene.seed, 1])
     size, centres = np.array(scene.size), lattice.copy()

@@ -225,7 +225,7 @@ def _law(contacts: Contacts, restitution: float) -> str:
     )
 
 
-def bytes_written(scene: Scene, schedule: Schedule) -> float:
+def estimate_bytes(scene: Scene, schedule: Schedule) -> float:
     """About how many bytes a run writes."""
     steps = Steps.of(schedule, scene.contacts.time_step)
     blocks, bins = steps.last / steps.block, scene.top / BIN

@@ -63,13 +63,13 @@ def cases() -> Iterator[StudyCase]:
     """All runs, in the order in which they are done: every chute once before seeds are changed, and first the seeds of
     flows that keep their state."""
     done = set()
-    for case in _ordered():
+    for case in _list_in_order():
         if case.name not in done:
             done.add(case.name)
             yield case
 
 
-def _ordered() -> Iterator[StudyCase]:
+def _list_in_order() -> Iterator[StudyCase]:
     yield from _waves()
     yield from _paper()
     yield from (_hot(0, seed) for seed in SEEDS)
@@ -120,7 +120,7 @@ def _waves() -> Iterator[StudyCase]:
         yield StudyCase(f"wide-{number + 1}", scene, _WAVE_SCHEDULE)
 
 
-def prepared(case: StudyCase, folder: str | os.PathLike[str]) -> Run:
+def prepare_case(case: StudyCase, folder: str | os.PathLike[str]) -> Run:
     """The run of a case in its folder below ``folder``; a hot start begins near the flow of the theory."""
     path = Path(folder) / case.name
     if (path / RECORD).exists():

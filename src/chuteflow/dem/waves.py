@@ -89,7 +89,7 @@ def amplitudes(run: Run, direction: str) -> Amplitudes:
     return Amplitudes(times, cos - 1j * sin, cos_v - 1j * sin_v, 2.0 * math.pi / length)
 
 
-def written(waves: Amplitudes) -> str:
+def format_csv(waves: Amplitudes) -> str:
     """The amplitudes as CSV, with the wavenumber before them."""
     lines = [f"# wavenumber = {waves.wavenumber!r}", ",".join(_COLUMNS)]
     columns = (waves.times, waves.density.real, waves.density.imag, waves.momentum.real, waves.momentum.imag)

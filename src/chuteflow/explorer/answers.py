@@ -19,7 +19,7 @@ from chuteflow.branches.results import Curve
 from chuteflow.checks import number_in
 from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.explorer import queries, sentences
-from chuteflow.explorer.contents import curve_content, limits_passed, short
+from chuteflow.explorer.contents import curve_content, find_limits_passed, short
 from chuteflow.explorer.heights import sample_heights
 from chuteflow.explorer.queries import GRAINS, Query
 from chuteflow.explorer.recipes import recipes
@@ -58,9 +58,9 @@ def answer(question: str, query: Query) -> Answer:
     except InputError as error:
         return problem(400, str(error))
     except ChuteflowError as error:
-        return left_out(question, query, str(error))
+        return leave_out(question, query, str(error))
     except _FAILURES as error:
-        return left_out(question, query, f"the computation failed ({type(error).__name__}: {error})")
+        return leave_out(question, query, f"the computation failed ({type(error).__name__}: {error})")
 
 
 def problem(status: int, what: str) -> Answer:
@@ -80,7 +80,7 @@ _LEFT_OUT = {
 }
 
 
-def left_out(question: str, query: Query, why: str) -> Answer:
+def leave_out(question: str, query: Query, why: str) -> Answer:
     """An answer that says what is left out and why; in place of flows, also how to compute them elsewhere."""
     content: dict[str, Any] = {"error": " ".join(f"{_LEFT_OUT[question]}: {why}".split())}
     if question == "flows":
@@ -139,17 +139,17 @@ def _profile(flow: Flow, top: float) -> dict[str, list[float]]:
 def _curve(query: Query) -> Answer:
     chute, other = queries.read(query, optional=GRAINS)
     scales = queries.scales(other)
-    found = _drawn(chute)
+    found = _solve_curve(chute)
     return _json(curve_content(found, scales))
 
 
 def _limits(query: Query) -> Answer:
     chute, _ = queries.read(query)
-    return _json({"words": [limits_passed(branch) for branch in _drawn(chute).branches]})
+    return _json({"words": [find_limits_passed(branch) for branch in _solve_curve(chute).branches]})
 
 
 @lru_cache(maxsize=4)
-def _drawn(chute: Chute) -> Curve:
+def _solve_curve(chute: Chute) -> Curve:
     """The curve as the page draws it; a query refers to its flows by their indices."""
     return curve(chute, points=_CURVE_POINTS, tolerance=_VISIBLE)
 
@@ -170,7 +170,7 @@ def _stability(query: Query) -> Answer:
         found = flows(chute, Q=queries.flux(other["Q"]), tolerance=_VISIBLE)
         flow = found[queries.place("flow", other, len(found))]
     else:
-        branches = _drawn(chute).branches
+        branches = _solve_curve(chute).branches
         branch = branches[queries.place("branch", other, len(branches))]
         flow = branch.flows[queries.place("point", other, len(branch.flows))]
     known = examine_stability(flow)

@@ -48,7 +48,7 @@ def densities(branch: Branch) -> list[str]:
     ]
 
 
-def limits_passed(branch: Branch) -> list[tuple[str, ...]]:
+def find_limits_passed(branch: Branch) -> list[tuple[str, ...]]:
     """The limits of the theory that each flow of a branch exceeds, by name."""
     return [flow.validity.words for flow in branch.flows]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chuteflow.checks import number_in, shown
+from chuteflow.checks import number_in, shorten
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS
 from chuteflow.parameters import BY_KEY
@@ -107,7 +107,7 @@ PRESETS = (
 
 def cases() -> list[Preset]:
     """The chutes and materials of ``chuteflow cases``, with their grains."""
-    return [Preset(one.name, _state(one), _known(one)) for one in CASES.values()]
+    return [Preset(one.name, _state(one), _describe_known(one)) for one in CASES.values()]
 
 
 def _state(one: Case) -> dict[str, float | str]:
@@ -117,7 +117,7 @@ def _state(one: Case) -> dict[str, float | str]:
     return said if grains is None else said | {"d": round(1e3 * grains.diameter, 12), "rho": grains.density}
 
 
-def _known(one: Case) -> str:
+def _describe_known(one: Case) -> str:
     numbers = {**one.numbers, **one.grains}
     kinds = {how: [key for key, known in numbers.items() if known.how == how] for how in (TYPICAL, GUESSED)}
     said = "; ".join(f"{how}: {', '.join(keys)}" for how, keys in kinds.items() if keys)
@@ -187,7 +187,7 @@ def file_name(given: Query) -> str:
         raise InputError(f"unknown parameter {unknown[:40]!r}")
     name = re.split(r"[/\\]", given.get("name", ""))[-1]
     if not name.lower().endswith((".csv", ".nc")) or not name.isprintable() or len(name) > _LONGEST_NAME:
-        raise InputError(f"{shown(name)}: must be a file .csv or .nc")
+        raise InputError(f"{shorten(name)}: must be a file .csv or .nc")
     return name
 
 

@@ -94,7 +94,7 @@ def sample_curve(
     halves = all(len(branch.flows) % 2 for branch in between.branches)
     # A branch with an even number of flows has no half that ends where it does.
     stored = _every_second(between) if halves else curve(chute, points=points, tolerance=_TOLERANCE, **within)
-    branches = tuple(map(_sampled, stored.branches))
+    branches = tuple(map(_sample_branch, stored.branches))
     pairs = zip(branches, between.branches, strict=True)
     return SampledCurve(stored, branches, _largest([_deviation(one, other) for one, other in pairs]))
 
@@ -116,7 +116,7 @@ def interpolate(table: Array, positions: Array) -> Array:
     return np.einsum("kn,kn...->n...", lagrange(rows.astype(float), positions), table[rows])
 
 
-def _sampled(branch: Branch) -> SampledBranch:
+def _sample_branch(branch: Branch) -> SampledBranch:
     flows = branch.flows
     chosen = flows[:: max(1, len(flows) // _CHOOSING)]
     heights = refine_heights([_field_sampler(flow) for flow in chosen], np.linspace(0.0, 1.0, 17), _STRAIGHT)[0]

@@ -12,7 +12,7 @@ from functools import partial
 from typing import ParamSpec, TypeVar
 
 from chuteflow.explorer import queries
-from chuteflow.explorer.answers import Answer, answer, left_out, problem
+from chuteflow.explorer.answers import Answer, answer, leave_out, problem
 from chuteflow.explorer.worker import Compute, Limits, NoAnswer, Worker
 from chuteflow.processes import available_cores
 
@@ -205,7 +205,7 @@ class Scheduler:
             return
         if asyncio.get_running_loop().time() - max(job.since, self._ready) > _LONGEST_WAIT:
             waiting.remove(job)
-            self._finish(job, left_out(job.question, job.query, _TOO_BUSY))
+            self._finish(job, leave_out(job.question, job.query, _TOO_BUSY))
 
     def _cancel(self, job: _Job) -> None:
         waiting = self._pools[job.at.pool].waiting
@@ -254,9 +254,9 @@ class Scheduler:
         if pool.not_started and (pool.waiting or pool.early) and not pool.starting:
             pool.starting = True
             self._first_starts = self._ready is None
-            self._spawn(self._started(pool, pool.not_started.popleft()))
+            self._spawn(self._start_worker(pool, pool.not_started.popleft()))
 
-    async def _started(self, pool: _Pool, worker: Worker) -> None:
+    async def _start_worker(self, pool: _Pool, worker: Worker) -> None:
         if self._closed:
             return
         await self._run(worker.start)
@@ -306,9 +306,9 @@ class Scheduler:
         elif outcome is NoAnswer.TOO_LONG:
             limit = sum(stage.limits.processor for stage in stages)
             why = f"not done within {limit:.2g} seconds of computing; the command line has no such limit"
-            self._finish(job, left_out(job.question, job.query, why), cache=True)
+            self._finish(job, leave_out(job.question, job.query, why), cache=True)
         elif outcome is NoAnswer.BUSY:
-            self._finish(job, left_out(job.question, job.query, _TOO_BUSY))
+            self._finish(job, leave_out(job.question, job.query, _TOO_BUSY))
         elif outcome is NoAnswer.CANCELLED or not job.broken:
             job.broken = outcome is NoAnswer.CRASHED
             self._queue(job)

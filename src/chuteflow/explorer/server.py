@@ -137,7 +137,7 @@ def application(
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
         middleware=[Middleware(Guard, hosts=hosts)],
-        exception_handlers={HTTPException: _refused, Exception: _failed},
+        exception_handlers={HTTPException: _refuse, Exception: _report_failure},
         lifespan=lifespan,
     )
     served.state.scheduler = scheduler
@@ -211,10 +211,10 @@ def _error(status: int, what: str) -> Response:
     return JSONResponse({"error": what}, status_code=status)
 
 
-async def _refused(request: Request, error: Exception) -> Response:
+async def _refuse(request: Request, error: Exception) -> Response:
     status = error.status_code if isinstance(error, HTTPException) else 500
     return _error(status, f"{request.url.path[:80]!r}: {getattr(error, 'detail', 'failed')}")
 
 
-async def _failed(_: Request, __: Exception) -> Response:
+async def _report_failure(_: Request, __: Exception) -> Response:
     return _error(500, "the server failed on this request")

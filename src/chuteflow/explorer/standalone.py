@@ -15,7 +15,7 @@ from chuteflow.branches.results import Curve
 from chuteflow.errors import SolveError
 from chuteflow.explorer import queries, sentences
 from chuteflow.explorer.about import about
-from chuteflow.explorer.contents import curve_content, limits_passed, short
+from chuteflow.explorer.contents import curve_content, find_limits_passed, short
 from chuteflow.explorer.recipes import recipes
 from chuteflow.explorer.sampled import FIELDS, Deviation, SampledBranch, SampledCurve, budget, sample_curve
 from chuteflow.io import contract, words
@@ -73,7 +73,7 @@ def _content(
         "about": _about(found.curve, flux, scales) | {"data": list(data)},
         "chute": contract.chute_object(chute),
         "curve": curve_content(found.curve, scales),
-        "limits": {"words": [limits_passed(branch) for branch in found.curve.branches]},
+        "limits": {"words": [find_limits_passed(branch) for branch in found.curve.branches]},
         "branches": [_branch(one) for one in found.branches],
         "recipes": recipes(chute, FLUX_PLACE, scales),
         "says": list(_notes(found, scales)),
@@ -88,7 +88,7 @@ FLUX_PLACE = "{flux}"
 def _about(curve: Curve, flux: float, scales: Scales | None) -> dict[str, Any]:
     """Metadata for the page: one case, and the flux as the only control."""
     fluxes = [float(q) for branch in curve.branches for q in branch.mass_flux] or [*queries.FLUX_RANGE]
-    control = replace(queries.CONTROLS["Q"], low=_rounded_down(min(fluxes)), high=-_rounded_down(-max(fluxes)))
+    control = replace(queries.CONTROLS["Q"], low=_round_down(min(fluxes)), high=-_round_down(-max(fluxes)))
     state = contract.chute_object(curve.chute) | {"Q": min(max(flux, control.low), control.high), "stability": ""}
     if scales is not None:
         state |= {"si": "1", "d": 1e3 * scales.diameter, "rho": scales.density}
@@ -102,7 +102,7 @@ def _about(curve: Curve, flux: float, scales: Scales | None) -> dict[str, Any]:
     }
 
 
-def _rounded_down(value: float, digits: int = 4) -> float:
+def _round_down(value: float, digits: int = 4) -> float:
     size = 10.0 ** (np.floor(np.log10(abs(value))) + 1 - digits)
     return float(f"{np.floor(value / size) * size:.{digits + 1}g}")
 
@@ -159,7 +159,7 @@ def _errors_in_words(errors: Deviation) -> str:
 
 def _percent(fraction: float) -> str:
     """A fraction with one digit, rounded up."""
-    return f"{-_rounded_down(-100.0 * fraction, 1):g} %" if fraction else "0 %"
+    return f"{-_round_down(-100.0 * fraction, 1):g} %" if fraction else "0 %"
 
 
 # --- the file ---------------------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ def _html(content: dict[str, Any]) -> str:
             '<meta charset="utf-8">',
             f'<meta charset="utf-8">\n<meta http-equiv="content-security-policy" content="{_POLICY}">',
         ),
-        ('<link rel="icon" href="page/icon.svg">', f'<link rel="icon" href="data:image/svg+xml,{_quoted(icon)}">'),
+        ('<link rel="icon" href="page/icon.svg">', f'<link rel="icon" href="data:image/svg+xml,{_quote(icon)}">'),
         (
             '<link rel="stylesheet" href="page/style.css">',
             f"<style>\n{(PAGE / 'style.css').read_text(encoding='utf-8')}</style>",
@@ -194,7 +194,7 @@ def _html(content: dict[str, Any]) -> str:
     return page
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     from urllib.parse import quote
 
     return quote(text)

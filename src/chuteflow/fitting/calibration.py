@@ -12,7 +12,7 @@ import numpy as np
 
 from chuteflow import display
 from chuteflow.branches.enumeration import flows
-from chuteflow.checks import number, shown, whole
+from chuteflow.checks import number, shorten, whole
 from chuteflow.errors import InputError, SolveError
 from chuteflow.fitting.direct import DirectMeasurement, direct
 from chuteflow.fitting.identifiability import trade_offs
@@ -26,7 +26,7 @@ from chuteflow.parameters import BY_KEY
 from chuteflow.progress import told
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.free import FreeParameter, chosen_parameters, varied
+from chuteflow.steady.free import FreeParameter, choose_parameters, vary
 from chuteflow.threads import on_one_thread
 
 #: Evaluations in a first fit from each start, in a second one of those that may be the best, and in the last; and the
@@ -287,10 +287,10 @@ def fit(
         SolveError: where no fit was found.
     """
     if loss not in LOSSES:
-        raise InputError(f"loss {shown(loss)}: choose one of {', '.join(LOSSES)}")
+        raise InputError(f"loss {shorten(loss)}: choose one of {', '.join(LOSSES)}")
     confidence = number("confidence", confidence, 0.5, 0.9999)
     trials = None if trials is None else whole("trials", trials, 1, _MOST_TRIALS)
-    parameters = chosen_parameters(chute, free, ranges or {})
+    parameters = choose_parameters(chute, free, ranges or {})
     if measured.in_units and any(parameter.key == "slope" for parameter in parameters):
         raise InputError("the slope is free, and makes the measurements dimensionless: give them without units")
     cases = tuple(TrialChute.of(experiment, chute, parameters) for experiment in measured.experiments)
@@ -298,7 +298,7 @@ def fit(
     _require_enough(objective)
     first = [np.array([parameter.of(chute) for parameter in parameters])]
     with told("fit", progress) as tell:
-        best, others = _searched(objective, first, trials, tell)
+        best, others = _search(objective, first, trials, tell)
     for _ in range(_ROUNDS):
         scale, covariance = _spread(objective, best, measured.errors_known)
         rise = _rise(confidence, objective.count - objective.unknowns, scale, measured.errors_known)
@@ -310,7 +310,7 @@ def fit(
             raise BetterFit(better)
         except BetterFit as found:
             others.append(best)
-            best = _ended(objective, found.found)
+            best = _finish(objective, found.found)
     else:
         raise SolveError("the fit keeps improving without converging: free fewer of them, or give other ranges")
     return _outcome(objective, measured, chute, best, others, covariance, scale, rise, intervals, confidence)
@@ -321,31 +321,31 @@ def _require_enough(objective: Objective) -> None:
     if count < unknowns:
         free = ", ".join(parameter.key for parameter in objective.cases[0].free) or "no parameter"
         more = [
-            *([display.counted(len(objective.labelled), "flow")] if objective.labelled else []),
+            *([display.count_of(len(objective.labelled), "flow")] if objective.labelled else []),
             *(["the height of the base"] if objective.base_unknown else []),
         ]
         also = f" and the place of {' and '.join(more)}" if more else ""
         raise InputError(
-            f"{display.counted(count, 'value')} cannot determine {unknowns} unknowns ({free}{also}): measure more, "
+            f"{display.count_of(count, 'value')} cannot determine {unknowns} unknowns ({free}{also}): measure more, "
             "or free fewer parameters"
         )
 
 
-def _searched(
+def _search(
     objective: Objective, first: list[Array], trials: int | None, tell: Callable[[float], Any]
 ) -> tuple[Minimum, list[Minimum]]:
     """The best fit, and the other minima that starts led to: from more trial chutes where those that are tried first
     lead to nothing that resembles the measurements."""
     if trials is not None:
-        return _searched_from(objective, candidates(objective, first, trials), tell)
+        return _search_from(objective, candidates(objective, first, trials), tell)
     with suppress(InputError):
-        best, others = _searched_from(objective, candidates(objective, first), tell)
+        best, others = _search_from(objective, candidates(objective, first), tell)
         if best.chi2 < _HOPELESS * objective.count:
             return best, others
-    return _searched_from(objective, candidates(objective, first, MANY_TRIALS), tell)
+    return _search_from(objective, candidates(objective, first, MANY_TRIALS), tell)
 
 
-def _searched_from(
+def _search_from(
     objective: Objective, starts: Sequence[StartingPoint], tell: Callable[[float], Any]
 ) -> tuple[Minimum, list[Minimum]]:
     kept: list[Minimum] = []
@@ -357,7 +357,7 @@ def _searched_from(
             objective.start(start.places), start.places, most=_FIRST, tolerance=_ROUGHLY, known=kept
         )
         if one is not None and not kept:
-            kept.append(_ended(objective, one))
+            kept.append(_finish(objective, one))
         elif one is not None:
             left.append(one)
     if not kept:
@@ -374,15 +374,15 @@ def _searched_from(
     beyond = _beyond_fold(objective, kept[0])
     if beyond is not None:
         kept = sorted([beyond, *kept], key=lambda one: one.chi2)
-    return closely if kept[0] is closely else _ended(objective, kept[0]), kept[1:]
+    return closely if kept[0] is closely else _finish(objective, kept[0]), kept[1:]
 
 
-def _ended(objective: Objective, one: Minimum) -> Minimum:
+def _finish(objective: Objective, one: Minimum) -> Minimum:
     """The minimum that a fit leads to, closely."""
     return objective.minimise(one.x.copy(), one.places, most=_LAST, tolerance=_CLOSELY) or one
 
 
-def _relaxed(objective: Objective, one: Minimum, error: float) -> tuple[Objective, Minimum] | None:
+def _relax(objective: Objective, one: Minimum, error: float) -> tuple[Objective, Minimum] | None:
     """The objective with numbers that are known exactly known to a relative ``error``, whose flows pass through folds
     of them; and its minimum near ``one``."""
     relaxed = replace(objective, cases=tuple(case.relaxed(error) for case in objective.cases))
@@ -406,7 +406,7 @@ def _at_fold(objective: Objective, one: Minimum) -> bool:
 
 def _beyond_fold(objective: Objective, one: Minimum) -> Minimum | None:
     """The minimum that is reached through a fold of a number that is known exactly, where one is near; else None."""
-    around = _relaxed(objective, one, _LENIENT) if _at_fold(objective, one) else None
+    around = _relax(objective, one, _LENIENT) if _at_fold(objective, one) else None
     if around is None:
         return None
     found = around[1]
@@ -431,7 +431,7 @@ def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: flo
     fits for one parameter at some distance is in the intervals of the others too.
     """
     near = _at_fold(objective, best)
-    around = _relaxed(objective, best, _TIGHT) if near else None
+    around = _relax(objective, best, _TIGHT) if near else None
     if around is not None and around[1].chi2 > best.chi2 + rise:
         near, around = False, None
     exactly: list[Minimum] = []
@@ -450,7 +450,7 @@ def _intervals(objective: Objective, best: Minimum, covariance: Array, rise: flo
                 exact = interval(objective, best, covariance, j, rise, exactly, onward=again)
                 one = exact if one is None else one.continued(exact)
             if "no flow" in one.ends and not near and any(case.exact for case in objective.cases):
-                around = around or _relaxed(objective, best, _TIGHT)
+                around = around or _relax(objective, best, _TIGHT)
                 if around is not None:
                     with suppress(BetterFit):
                         relaxed = interval(*around, _spread(*around, known)[1], j, rise, relaxedly, onward=again)
@@ -535,9 +535,9 @@ def _outcome(
     for i, (case, place) in enumerate(zip(objective.cases, best.places, strict=True)):
         column = objective.base_column(i)
         base = None if column is None else float(best.x[column])
-        experiments.append(_fitted(case, place, base, None if column is None else float(error[column])))
+        experiments.append(_describe_fit(case, place, base, None if column is None else float(error[column])))
     return Fit(
-        chute=varied(chute, free, best.x[:k].tolist()),
+        chute=vary(chute, free, best.x[:k].tolist()),
         free=free,
         measured=measured,
         estimates=estimates,
@@ -554,7 +554,7 @@ def _outcome(
     )
 
 
-def _fitted(case: TrialChute, place: TrialFlow, base: float | None, base_error: float | None) -> Fitted:
+def _describe_fit(case: TrialChute, place: TrialFlow, base: float | None, base_error: float | None) -> Fitted:
     residual = case.residual(place.flow, base or 0.0)
     profiles, first = [], 0
     for series in case.experiment.profiles:

@@ -9,7 +9,7 @@ import numpy as np
 
 from chuteflow import display
 from chuteflow.errors import InputError
-from chuteflow.fitting.measurements import SCALARS, StandardErrors, assembled
+from chuteflow.fitting.measurements import SCALARS, StandardErrors, assemble
 from chuteflow.fitting.objective import Objective
 from chuteflow.fitting.residuals import TrialChute
 from chuteflow.fitting.starts import candidates
@@ -17,7 +17,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import CONDITIONS
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.free import FreeParameter, chosen_parameters
+from chuteflow.steady.free import FreeParameter, choose_parameters
 from chuteflow.threads import on_one_thread
 
 #: Relative differences of the numbers that count as one error, and the largest sum of squares of a solution.
@@ -47,7 +47,7 @@ class Design:
     reason: str | None
 
     def __repr__(self) -> str:
-        said = display.counted(len(self.solutions), "solution") if self.solutions else self.reason
+        said = display.count_of(len(self.solutions), "solution") if self.solutions else self.reason
         return display.line("Design", said)
 
 
@@ -74,10 +74,11 @@ def design(
     Raises:
         InputError: for unknown names, or another number of conditions.
     """
-    parameters = chosen_parameters(chute, unknown, ranges or {})
+    parameters = choose_parameters(chute, unknown, ranges or {})
     if len(wanted) != len(parameters) + 1:
         raise InputError(
-            f"{display.counted(len(wanted), 'condition')} for {display.counted(len(parameters), 'unknown parameter')}: "
+            f"{display.count_of(len(wanted), 'condition')} for "
+            f"{display.count_of(len(parameters), 'unknown parameter')}: "
             f"give {len(parameters) + 1}, as the flow on each chute is unknown too"
         )
     for symbol in wanted:
@@ -85,7 +86,7 @@ def design(
             raise InputError(f"unknown quantity {symbol!r}: choose from {', '.join(SCALARS)}")
     exact = next((symbol for symbol in CONDITIONS if symbol in wanted), None)
     errors = {symbol: StandardErrors(_ERROR, relative=True) for symbol in wanted if symbol != exact}
-    experiment = assembled("wanted", None, {}, wanted, errors, {}, {})
+    experiment = assemble("wanted", None, {}, wanted, errors, {}, {})
     objective = Objective((TrialChute.of(experiment, chute, parameters),), False, "linear")
     here = np.array([parameter.of(chute) for parameter in parameters])
     try:

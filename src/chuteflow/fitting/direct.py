@@ -99,21 +99,21 @@ def direct(experiment: Experiment, chute: Chute, *, error_scale: float = 1.0, se
     t = _draws(temperature, rng, error_scale)[:, np.searchsorted(temperature.height, height)]
     density = draws[:, picked]
     law, e, slope = chute.law, chute.restitution, chute.slope
-    _, _, coefficients = law.at(_scaled(density, law), e, slope)
-    g1 = _summed(stress / t, density * coefficients.compressibility)
+    _, _, coefficients = law.at(_scale(density, law), e, slope)
+    g1 = _summarise(stress / t, density * coefficients.compressibility)
     g2 = slip = None
     if velocity is not None:
         u = _draws(velocity, rng, error_scale)[:, np.searchsorted(velocity.height, height)]
         with np.errstate(invalid="ignore", divide="ignore"):
             shear = slope * stress / (np.sqrt(t) * (u @ _slopes(height).T))
-        g2 = _summed(shear, np.broadcast_to(coefficients.viscosity, density.shape))
+        g2 = _summarise(shear, np.broadcast_to(coefficients.viscosity, density.shape))
         at_base = _at_base(height)
         t_0, nu_0 = np.maximum(t @ at_base, 1e-12), np.maximum(density @ at_base, 1e-12)
-        slip = _summed((u @ at_base / np.sqrt(t_0))[:, None], _slip(chute, law, _scaled(nu_0, law))[:, None])
+        slip = _summarise((u @ at_base / np.sqrt(t_0))[:, None], _slip(chute, law, _scale(nu_0, law))[:, None])
     return DirectMeasurement(experiment.name, height, nu.value[picked], g1, g2, slip, str(chute.closure))
 
 
-def _scaled(nu: Array, law: Law) -> Array:
+def _scale(nu: Array, law: Law) -> Array:
     """nu/(1 - nu/nu*), of densities beyond the packing that of the densest."""
     return nu / (1.0 - np.minimum(nu / law.densest, 0.999999))
 
@@ -162,7 +162,7 @@ def _at_base(z: Array) -> Array:
     return out
 
 
-def _summed(draws: Array, law: Array) -> MeasuredFunction:
+def _summarise(draws: Array, law: Array) -> MeasuredFunction:
     """The first draw, which is without noise, and how far the others spread."""
     return MeasuredFunction(draws[0], _width(draws[1:]), law[0], _width(draws[1:] / law[1:]))
 

@@ -135,7 +135,7 @@ class _IntervalSide:
             place = bound if at_bound else place
             if place == at:
                 return bound, "bound"
-            found = self._fitted(place, inside, before)
+            found = self._fit_at(place, inside, before)
             root = np.inf if found is None else self._root(found)
             if found is None or root > _FAR * goal:
                 careful = True
@@ -169,7 +169,7 @@ class _IntervalSide:
         """The root of the rise of chi2, which is almost linear in the parameter."""
         return float(np.sqrt(max(one.chi2 - self.best.chi2, 0.0)))
 
-    def _fitted(self, value: float, inside: Minimum, before: Minimum | None) -> Minimum | None:
+    def _fit_at(self, value: float, inside: Minimum, before: Minimum | None) -> Minimum | None:
         """The best fit with the unknown at ``value``, from the one inside: the others go on as they went, or as the
         covariance says, or stay."""
         found: Minimum | None = None

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chuteflow import display
-from chuteflow.checks import number, real_array, shown
+from chuteflow.checks import number, real_array, shorten
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY, CONDITIONS
@@ -99,8 +99,8 @@ class Measurements:
     in_units: bool = False
 
     def __repr__(self) -> str:
-        many = display.counted(len(self.experiments), "experiment")
-        return display.line("Measurements", f"{many}, {display.counted(self.count, 'value')}")
+        many = display.count_of(len(self.experiments), "experiment")
+        return display.line("Measurements", f"{many}, {display.count_of(self.count, 'value')}")
 
     @cached_property
     def count(self) -> int:
@@ -148,7 +148,7 @@ def measurements(
     said = {key: StandardErrors(value) for key, value in (errors or {}).items()}
     said |= {key: StandardErrors(value, relative=True) for key, value in (relative_errors or {}).items()}
     profiles = {key: value for key, value in (("nu", nu), ("T", T), ("u", u)) if value is not None}
-    return together([assembled(name, z, profiles, numbers or {}, said, given or {}, trust or {})])
+    return together([assemble(name, z, profiles, numbers or {}, said, given or {}, trust or {})])
 
 
 def together(parts: Sequence[Experiment | Measurements], *, in_units: bool = False) -> Measurements:
@@ -178,11 +178,11 @@ def together(parts: Sequence[Experiment | Measurements], *, in_units: bool = Fal
         raise InputError("errors are given for some values and not for others: give them for all, or for none")
     errors_known = known == {True}
     if not errors_known:
-        found = [_with_assumed(experiment) for experiment in found]
+        found = [_assume_errors(experiment) for experiment in found]
     return Measurements(tuple(found), errors_known, in_units or any(getattr(p, "in_units", False) for p in parts))
 
 
-def assembled(
+def assemble(
     name: str,
     z: ArrayLike | None,
     profiles: Mapping[str, ArrayLike],
@@ -199,11 +199,11 @@ def assembled(
     what = f"experiment {name}: "
     for key in errors:
         if key not in profiles and key not in numbers:
-            raise InputError(f"{what}errors of {shown(key)} are given, and no values")
+            raise InputError(f"{what}errors of {shorten(key)} are given, and no values")
     for key in (*given, *trust):
         known = (*BY_KEY, "z", *PROFILES)
         if key not in known:
-            raise InputError(f"{what}unknown {shown(key)}: choose from {', '.join(known)}")
+            raise InputError(f"{what}unknown {shorten(key)}: choose from {', '.join(known)}")
     series = ()
     if profiles:
         if z is None:
@@ -216,7 +216,9 @@ def assembled(
     scalars = []
     for symbol in (*(s for s in CONDITIONS if s in numbers), *(s for s in numbers if s not in CONDITIONS)):
         if symbol not in SCALARS:
-            raise InputError(f"{what}unknown quantity {shown(symbol)}: choose from {', '.join((*PROFILES, *SCALARS))}")
+            raise InputError(
+                f"{what}unknown quantity {shorten(symbol)}: choose from {', '.join((*PROFILES, *SCALARS))}"
+            )
         value = _positive(f"{what}{symbol}", number(f"{what}{symbol}", numbers[symbol]))
         if symbol not in errors and symbol in CONDITIONS and not exact:
             exact[symbol] = value
@@ -256,7 +258,7 @@ def _series(
     trust: Mapping[str, tuple[float, float]],
 ) -> Series:
     if symbol not in PROFILES:
-        raise InputError(f"{what}unknown profile {shown(symbol)}: choose from {', '.join(PROFILES)}")
+        raise InputError(f"{what}unknown profile {shorten(symbol)}: choose from {', '.join(PROFILES)}")
     z, used = heights
     value = real_array(symbol, values).ravel()
     if value.shape != z.shape:
@@ -312,7 +314,7 @@ def _positive(what: str, value: float) -> float:
     return value
 
 
-def _with_assumed(experiment: Experiment) -> Experiment:
+def _assume_errors(experiment: Experiment) -> Experiment:
     profiles = tuple(
         Series(s.symbol, s.height, s.value, np.full(len(s.value), ASSUMED), True) for s in experiment.profiles
     )

@@ -148,7 +148,7 @@ class Objective:
             label = place.label if column is None else float(best.x[column])
             if column is not None and place.weights != there.weights:
                 label = float(np.array(place.weights) @ there.flow.solution.macroscopic)
-            off = place.expected_place(best.x[: self.parameters], label) - there.flow.solution.macroscopic
+            off = place.estimate_place(best.x[: self.parameters], label) - there.flow.solution.macroscopic
             if float(np.abs(off).max()) > _ELSEWHERE:
                 return False
         return True

@@ -92,7 +92,7 @@ class Prediction:
     confidence: float
 
     def __repr__(self) -> str:
-        return display.line("Prediction", display.counted(len(self.flows), "flow"), self.flow_set.reason)
+        return display.line("Prediction", display.count_of(len(self.flows), "flow"), self.flow_set.reason)
 
     @property
     def widths(self) -> float:
@@ -156,11 +156,11 @@ def predict(calibration: Calibration, *, confidence: float = CONFIDENCE, **asked
     given: dict[str, Any] = dict(asked)
     found = flows(calibration.chute, **given)
     ((key, value),) = asked.items()
-    predicted = tuple(_predicted(flow, calibration, key) for flow in found)
+    predicted = tuple(_predict(flow, calibration, key) for flow in found)
     return Prediction(calibration, found, predicted, (key, float(value)), confidence)
 
 
-def _predicted(flow: Flow, calibration: Calibration, at: str) -> PredictedFlow:
+def _predict(flow: Flow, calibration: Calibration, at: str) -> PredictedFlow:
     answer: Sensitivity = sensitivity(flow, calibration.keys, at=at)
     numbers = {
         name: (float(getattr(flow, name)), _error(rates, calibration.covariance))

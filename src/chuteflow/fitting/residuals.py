@@ -24,7 +24,7 @@ from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
-from chuteflow.steady.free import FreeParameter, varied
+from chuteflow.steady.free import FreeParameter, vary
 from chuteflow.steady.model import Model, model, model_along
 from chuteflow.steady.sensitivity import WHICH, Sensitivity, sensitivity, slopes_in_height
 from chuteflow.steady.solver import Condition, resolve
@@ -103,7 +103,7 @@ class TrialChute:
         Raises:
             InputError: for values out of range.
         """
-        return varied(self.chute, self.free, values.tolist())
+        return vary(self.chute, self.free, values.tolist())
 
     def candidates(self, values: Array) -> list[Flow]:
         """All flows that could be meant where the free parameters have these values."""
@@ -132,9 +132,9 @@ class TrialChute:
     def followed(self, start: TrialFlow, values: Array, label: float) -> Flow | None:
         """The flow at other values of the free parameters and another place on the branch, or None where there is none
         nearby."""
-        return self._followed(start, values, label, _HALVINGS)
+        return self._follow(start, values, label, _HALVINGS)
 
-    def _followed(self, start: TrialFlow, values: Array, label: float, halvings: int) -> Flow | None:
+    def _follow(self, start: TrialFlow, values: Array, label: float, halvings: int) -> Flow | None:
         try:
             chute = self.at(values)
             problem = self._model(chute)
@@ -150,10 +150,10 @@ class TrialChute:
         if halvings == 0:
             return None
         middle, between = 0.5 * (start.values + values), 0.5 * (start.label + label)
-        half = self._followed(start, middle, between, halvings - 1)
+        half = self._follow(start, middle, between, halvings - 1)
         if half is None:
             return None
-        return self._followed(TrialFlow(half, middle, start.weights, between), values, label, halvings - 1)
+        return self._follow(TrialFlow(half, middle, start.weights, between), values, label, halvings - 1)
 
     def _model(self, chute: Chute) -> Model:
         """The model of a chute, in a way that leaves the tables of its derivatives at hand: they are asked for next."""
@@ -260,9 +260,9 @@ class TrialFlow:
         """How far the flow moves in m, as far as is known."""
         if "answer" not in self.__dict__:
             return 0.5
-        return float(np.linalg.norm(self.expected_place(values, label) - self.flow.solution.macroscopic))
+        return float(np.linalg.norm(self.estimate_place(values, label) - self.flow.solution.macroscopic))
 
-    def expected_place(self, values: Array, label: float) -> Array:
+    def estimate_place(self, values: Array, label: float) -> Array:
         """ln Q, ln h, ln M and ln T_surface (4,) at other values and another label, by the derivatives here."""
         by_parameters, by_label = self.held(self.answer.tangent, self.answer.across.T)
         moved = (values - self.values) @ by_parameters + by_label * (label - self.label)

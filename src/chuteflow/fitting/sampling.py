@@ -37,7 +37,7 @@ class Posterior:
     accepted: float
 
     def __repr__(self) -> str:
-        return display.line("Posterior", display.counted(len(self.draws), "draw"), ", ".join(self.keys))
+        return display.line("Posterior", display.count_of(len(self.draws), "draw"), ", ".join(self.keys))
 
     def interval(self, key: str, confidence: float = 0.95) -> tuple[float, float]:
         """The central interval of a parameter that holds a fraction ``confidence`` of the draws.

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from chuteflow.amounts import positive_amount
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shorten
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.cases import Case, CaseNumber, case, nearest_names
@@ -36,12 +36,12 @@ def read_chute(path: str | os.PathLike[str]) -> Case:
         InputError: for a file that cannot be read, is no TOML, or says what is not known, twice or no number.
     """
     try:
-        return _case(Path(path).name, _flat(_parsed(path)))
+        return _case(Path(path).name, _flat(_parse(path)))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _parsed(path: str | os.PathLike[str]) -> dict[str, Any]:
+def _parse(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         with Path(path).open("rb") as file:
             text = file.read(_LARGEST + 1)
@@ -62,7 +62,7 @@ def _flat(found: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in found.items():
         inside = value if key in ("chute", "grains") else {key: value}
         if not isinstance(inside, Mapping):
-            raise InputError(f"{key} = {shown(value)}: must be a table")
+            raise InputError(f"{key} = {shorten(value)}: must be a table")
         for name, one in inside.items():
             if name not in _KEYS:
                 raise InputError(f"unknown key {name[:40]!r}: {nearest_names(name[:40], _KEYS)}")
@@ -96,5 +96,5 @@ def _case(name: str, given: dict[str, Any]) -> Case:
 
 def _text(name: str, value: Any) -> str:
     if not isinstance(value, str):
-        raise InputError(f"{name} = {shown(value)}: must be a name in quotes")
+        raise InputError(f"{name} = {shorten(value)}: must be a name in quotes")
     return value

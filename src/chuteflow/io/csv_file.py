@@ -17,7 +17,7 @@ import numpy as np
 
 from chuteflow import __version__
 from chuteflow.branches.results import Curve
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.io import contract, records
 from chuteflow.io.contract import factor
@@ -56,7 +56,7 @@ def read(path: Path) -> Result:
     rows = [contract.parsed(line.removeprefix(_ROW)) for line in lines if line.startswith(_ROW)]
     count = head.pop("rows")
     if len(rows) != count:
-        raise InputError(f"it is cut short, or has lines twice: {len(rows)} of {shown(count)} flows are in it")
+        raise InputError(f"it is cut short, or has lines twice: {len(rows)} of {shorten(count)} flows are in it")
     return records.restored(head, rows)
 
 

@@ -108,7 +108,7 @@ def attributes(result: Flow | FlowSet | Curve, scales: Scales | None) -> dict[st
     found: dict[str, Any] = {**_about(TITLES[KIND_OF[type(result)]], scales), **result.chute.as_dict()}
     if not isinstance(result, Flow):
         found |= {
-            **_searched(result.searched),
+            **_describe_search(result.searched),
             "searched_comment": "dimensionless range in which flows were searched for",
             "tolerance": result.tolerance,
             "tolerance_comment": "relative error allowed in Q, h and M",
@@ -136,7 +136,7 @@ def _about(title: str, scales: Scales | None) -> dict[str, Any]:
     }
 
 
-def _searched(searched: Searched) -> dict[str, Any]:
+def _describe_search(searched: Searched) -> dict[str, Any]:
     return {
         "searched_surface_temperature": np.array(searched.surface_temperature),
         "searched_largest_holdup": searched.largest_holdup,
@@ -149,10 +149,10 @@ def flow_variables(found: Sequence[Row], scales: Scales | None) -> dict[str, Var
     flows = [row.flow for row in found]
     variables = {}
     for name, quantity in NUMBERS.items():
-        values = _scaled(flows, name, scales)
+        values = _scale(flows, name, scales)
         # There is no interface on the half-line.
         if not len(values) or np.isfinite(values).all():
-            described = _described(quantity, scales) | {"ancillary_variables": "error status"}
+            described = _describe(quantity, scales) | {"ancillary_variables": "error status"}
             variables[name] = Variable(along, values, described)
     error = {"units": "1", "long_name": "estimated relative error of Q, h and M, the largest"}
     status = [flow.solution.status.name.lower() for flow in flows]
@@ -209,7 +209,7 @@ def _profiles(found: Sequence[Row], scales: Scales | None) -> dict[str, Variable
         by = [factor(name, row.flow.chute, scales) for row in found]
         values = np.array([getattr(p, name) * f for p, f in zip(profiles, by, strict=True)]).reshape(-1, HEIGHTS)
         beside = {"positive": "up"} if name == "height" else {"coordinates": "height"}
-        variables[name] = Variable(("flow", "height_index"), values, _described(quantity, scales) | beside)
+        variables[name] = Variable(("flow", "height_index"), values, _describe(quantity, scales) | beside)
     return variables
 
 
@@ -218,17 +218,17 @@ def _of_profile(result: Profile, scales: Scales | None = None) -> Dataset:
     if scales is not None:
         raise InputError("a profile does not know the slope, on which the scales depend: multiply by Scales.factor")
     fields = {
-        name: Variable(("height_index",), np.ravel(getattr(result, name)), _described(quantity, None))
+        name: Variable(("height_index",), np.ravel(getattr(result, name)), _describe(quantity, None))
         for name, quantity in FIELDS.items()
     }
     return Dataset(fields, {"comment": numbers_are(None)}, ("height",))
 
 
-def _scaled(flows: Sequence[Any], name: str, scales: Scales | None) -> np.ndarray:
+def _scale(flows: Sequence[Any], name: str, scales: Scales | None) -> np.ndarray:
     return np.array([getattr(flow, name) * factor(name, flow.chute, scales) for flow in flows])
 
 
-def _described(quantity: Quantity, scales: Scales | None) -> dict[str, str]:
+def _describe(quantity: Quantity, scales: Scales | None) -> dict[str, str]:
     return {
         "units": quantity.unit_without_scales if scales is None else quantity.unit,
         "long_name": quantity.description,
@@ -286,7 +286,7 @@ def _along_boundaries(boundaries: Sequence[Boundary], second: str, scales: Scale
         "special": flags(along, [kind for _, kind, *_ in points], kinds, "kind of turning point", comment),
         second: variable(along, [getattr(flow.chute, second) for flow in flows], second),
         **{
-            name: variable(along, _scaled(flows, name, scales), NUMBERS[name].description, _unit(name, scales))
+            name: variable(along, _scale(flows, name, scales), NUMBERS[name].description, _unit(name, scales))
             for name in PLACE
         },
         "error": variable(
@@ -332,7 +332,7 @@ def _about_domain(found: Domain) -> dict[str, Any]:
     return {
         **_about(DOMAIN_TITLE, None),
         **fixed,
-        **_searched(found.searched),
+        **_describe_search(found.searched),
         "tolerance": found.tolerance,
         "tolerance_comment": "fraction of each axis to which boundaries are located",
     }
@@ -392,7 +392,7 @@ def _of_family(result: FamilyMap, scales: Scales | None = None) -> Dataset:
     axes = {
         "depth_wavenumber": variable(("depth_wavenumber",), result.depth_wavenumber, "wavenumber times centre of mass"),
         **{
-            name: Variable(("flow",), _scaled(result.flows, name, scales), _described(NUMBERS[name], scales))
+            name: Variable(("flow",), _scale(result.flows, name, scales), _describe(NUMBERS[name], scales))
             for name in PLACE
         },
     }
@@ -411,7 +411,7 @@ def _growth(
     return {
         **{
             name: Variable(
-                dimensions, factor(name, chute, scales) * getattr(found, name), _described(SCALED[name], scales)
+                dimensions, factor(name, chute, scales) * getattr(found, name), _describe(SCALED[name], scales)
             )
             for name in ("growth", "frequency")
         },
@@ -429,7 +429,7 @@ def _of_stability(result: Stability, scales: Scales | None = None) -> Dataset:
     return Dataset(
         {
             **{
-                name: Variable((), np.asarray(value), _described(NUMBERS[name], scales))
+                name: Variable((), np.asarray(value), _describe(NUMBERS[name], scales))
                 for name, value in numbers.items()
             },
             "stability": Variable((), np.asarray(known)),
@@ -455,7 +455,7 @@ def _of_relaxation(result: Relaxation, scales: Scales | None = None) -> Dataset:
         name: Variable(
             ("time",),
             factor(name, chute, scales) * np.array([getattr(moment, name) for moment in result.moments]),
-            _described(SCALED[name], scales),
+            _describe(SCALED[name], scales),
         )
         for name in ("time", "mass_flux", "centre_of_mass", "surface_temperature", "base_temperature")
     }
@@ -488,7 +488,7 @@ def _of_scan(result: Scan, scales: Scales | None = None) -> Dataset:
     }
     for name, values in result.quantities.items():
         if name in NUMBERS:
-            variables[name] = Variable((*points, "flow"), values * by(name), _described(NUMBERS[name], scales))
+            variables[name] = Variable((*points, "flow"), values * by(name), _describe(NUMBERS[name], scales))
         else:
             variables[name] = Variable((*points, "flow"), values, result.flags(name))
     return Dataset({**axes, **variables}, {"comment": numbers_are(scales), **result.fixed}, points)

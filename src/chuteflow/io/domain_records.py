@@ -14,7 +14,7 @@ import numpy as np
 
 from chuteflow import __version__
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.checks import checked_size, number, whole
+from chuteflow.checks import check_size, number, whole
 from chuteflow.errors import InputError
 from chuteflow.io import contract
 from chuteflow.io.contract import SHORT
@@ -160,7 +160,7 @@ def _restored(kept: Mapping[str, Any]) -> Domain:
     plane = ParameterPlane(x, y, chute, tuple(temperatures.tolist()), within)
     found = Domain.on_cells(
         plane,
-        checked_size(kept["size"], 1, LARGEST_SIZE),
+        check_size(kept["size"], 1, LARGEST_SIZE),
         number("tolerance", kept["tolerance"], FINEST, COARSEST),
         _columns_from(kept["columns"], len(CODES) + len(temperatures)),
         _columns_from(kept["hot_columns"], len(HOT_CODES)),

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chuteflow.amounts import read_si
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shorten
 from chuteflow.errors import InputError
 from chuteflow.fitting.measurements import (
     PROFILES,
@@ -24,7 +24,7 @@ from chuteflow.fitting.measurements import (
     Experiment,
     Measurements,
     StandardErrors,
-    assembled,
+    assemble,
     together,
 )
 from chuteflow.io.units import WITHOUT_GRAINS
@@ -84,7 +84,7 @@ def read_measurements(
     """
     try:
         columns, rows = _table(Path(path))
-        experiments = _grouped(columns, rows)
+        experiments = _group(columns, rows)
         parts = [_experiment(name, columns, part, slope, scales, trust or {}) for name, part in experiments.items()]
         in_units = any(column.unit and not column.relative for column in columns)
         return together(parts, in_units=in_units)
@@ -122,7 +122,7 @@ def _table(path: Path) -> tuple[list[_MeasuredColumn], list[list[str]]]:
 def _column(title: str) -> _MeasuredColumn:
     match = _COLUMN.fullmatch(title)
     if match is None:
-        raise InputError(f"column {shown(title)}: name it as in nu or z [mm]")
+        raise InputError(f"column {shorten(title)}: name it as in nu or z [mm]")
     name, unit = match[1], match[2] or ""
     found = _ERROR.fullmatch(name)
     error = found is not None
@@ -130,11 +130,13 @@ def _column(title: str) -> _MeasuredColumn:
     key = _ALIASES.get(key, key)
     known = ("experiment", "z", *PROFILES, *SCALARS, *BY_KEY, "angle")
     if key not in known or (error and key not in PROFILES and key not in SCALARS):
-        raise InputError(f"unknown column {shown(title)}: choose from {', '.join(known)}, and errors such as nu_error")
+        raise InputError(
+            f"unknown column {shorten(title)}: choose from {', '.join(known)}, and errors such as nu_error"
+        )
     return _MeasuredColumn(title.strip(), key, error, unit)
 
 
-def _grouped(columns: Sequence[_MeasuredColumn], rows: Sequence[list[str]]) -> dict[str, list[list[str]]]:
+def _group(columns: Sequence[_MeasuredColumn], rows: Sequence[list[str]]) -> dict[str, list[list[str]]]:
     place = next((i for i, column in enumerate(columns) if column.key == "experiment"), None)
     found: dict[str, list[list[str]]] = {}
     for row in rows:
@@ -198,7 +200,7 @@ def _experiment(
             if not all(map(math.isnan, there)):
                 errors[column.key] = StandardErrors(spread, column.relative)
     heights = scaled.get(("z", False)) if has_profile and profiles else None
-    return assembled(name, heights, profiles, numbers, errors, given, trust)
+    return assemble(name, heights, profiles, numbers, errors, given, trust)
 
 
 def _cell(name: str, column: _MeasuredColumn, text: str) -> float:
@@ -208,10 +210,10 @@ def _cell(name: str, column: _MeasuredColumn, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise InputError(f"experiment {name}: {column.title} = {shown(text)}: must be a number, or empty") from None
+        raise InputError(f"experiment {name}: {column.title} = {shorten(text)}: must be a number, or empty") from None
     if not math.isfinite(value):
         raise InputError(
-            f"experiment {name}: {column.title} = {shown(text)}: must be finite; leave it empty if missing"
+            f"experiment {name}: {column.title} = {shorten(text)}: must be finite; leave it empty if missing"
         )
     return value
 

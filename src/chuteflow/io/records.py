@@ -19,7 +19,7 @@ import numpy as np
 from chuteflow.branches.lines import in_order
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import KINDS, Branch, Cells, Curve, FlowSet, Searched, SpecialPoint
-from chuteflow.checks import number, shown, whole
+from chuteflow.checks import number, shorten, whole
 from chuteflow.errors import InputError
 from chuteflow.io.contract import PARAMETERS, chute_object, closure_object, finite
 from chuteflow.numerics.chebyshev import Array
@@ -28,7 +28,7 @@ from chuteflow.steady.collocation import WHOLE, Collocation
 from chuteflow.steady.elements import DEGREES, MOST_PIECES
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.model import model
-from chuteflow.steady.solver import Solution, SolverStatus, checked_tolerance
+from chuteflow.steady.solver import Solution, SolverStatus, check_tolerance
 from chuteflow.theory.constitutive import Law, Unknown, fingerprint
 from chuteflow.theory.laws import law, runs_code
 
@@ -187,7 +187,7 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
         raise InputError("a flow has the wrong number of unknowns")
     z = numbers("the unknowns of a flow", kept["z"])
     if kept["status"] not in SolverStatus.__members__:
-        raise InputError(f"a flow has the unknown status {shown(kept['status'])}")
+        raise InputError(f"a flow has the unknown status {shorten(kept['status'])}")
     status = SolverStatus[kept["status"]]
     logarithms = [math.nan if v is None else number("ln Q, ln h, ln M or ln T", v) for v in kept["macroscopic"]]
     error = math.inf if kept["error"] is None else number("the error of a flow", kept["error"], 0.0)
@@ -202,7 +202,7 @@ def row_from(chute: Chute, kept: Mapping[str, Any]) -> Row:
         if not distance <= _AGREEMENT:
             raise InputError("the unknowns of a flow do not give its mass flux, centre of mass and hold-up")
     if kept["special"] and kept["special"] not in KINDS:
-        raise InputError(f"it holds an unknown kind of special point, {shown(kept['special'])}")
+        raise InputError(f"it holds an unknown kind of special point, {shorten(kept['special'])}")
     return Row(Flow(chute, solution), whole("the branch of a flow", kept["branch"], 0), str(kept["special"]))
 
 
@@ -272,7 +272,7 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
         kept["searched"]["surface_temperature"], kept["searched"]["largest_holdup"], chute.surface
     )
     searched = Searched((within.coldest, within.hottest), within.deepest, _cells(kept["searched"]))
-    tolerance, reason = checked_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
+    tolerance, reason = check_tolerance(kept["tolerance"]), _sentence("reason", kept["reason"])
     incomplete = _sentence("incomplete", kept.get("incomplete"))
     if kind == "flows":
         flows = tuple(row.flow for row in found)
@@ -281,7 +281,7 @@ def _result(chute: Chute, kept: Mapping[str, Any], found: Sequence[Row]) -> Resu
                 raise InputError("its flows are not from hot to cold, each once")
         return FlowSet(chute, flows, searched, tolerance, reason, incomplete)
     if kind != "curve":
-        raise InputError(f"it holds an unknown kind of result, {shown(kind)}")
+        raise InputError(f"it holds an unknown kind of result, {shorten(kind)}")
     ends = [(str(begin), str(end)) for begin, end in kept["ends"]]
     if any(row.branch >= len(ends) for row in found):
         raise InputError("it holds flows of a branch that is not in it")
@@ -300,7 +300,7 @@ def _cells(kept: Mapping[str, Any]) -> Cells | None:
 
 def _sentence(name: str, value: Any) -> str | None:
     if not (value is None or isinstance(value, str)):
-        raise InputError(f"{name} = {shown(value)}: must be a sentence or null")
+        raise InputError(f"{name} = {shorten(value)}: must be a sentence or null")
     return value
 
 

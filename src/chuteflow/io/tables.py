@@ -33,11 +33,11 @@ def table(rows: Sequence[Sequence[str]], words: Sequence[int] = ()) -> str:
     """Rows of cells as columns, numbers to the right and the columns ``words`` to the left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
 
-    def aligned(row: Sequence[str]) -> str:
+    def align(row: Sequence[str]) -> str:
         cells = [
             cell.ljust(width) if column in words else cell.rjust(width)
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         return "  ".join(cells).rstrip()
 
-    return "\n".join(aligned(row) for row in rows)
+    return "\n".join(align(row) for row in rows)

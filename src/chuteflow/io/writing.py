@@ -34,8 +34,8 @@ def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
     partial = _beside(target)
     try:
         _remove_abandoned(target.parent)
-        if not _written_unnamed(partial, data):
-            _written_named(partial, data)
+        if not _write_unnamed(partial, data):
+            _write_named(partial, data)
         if target.exists():
             shutil.copymode(target, partial)
         partial.replace(target)
@@ -75,7 +75,7 @@ def require_writable(path: str | os.PathLike[str], suffixes: Sequence[str]) -> s
     suffix = require_suffix(path, suffixes)
     trial = _beside(_target(path))
     try:
-        descriptor = _unnamed(trial.parent)
+        descriptor = _open_unnamed(trial.parent)
         if descriptor is None:
             trial.touch(exist_ok=False)
             trial.unlink()
@@ -116,7 +116,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _unnamed(folder: Path) -> int | None:
+def _open_unnamed(folder: Path) -> int | None:
     """A descriptor of a new file in ``folder`` that has no name, and so never outlives its process; None where the
     system has no such files."""
     flag = getattr(os, "O_TMPFILE", None)
@@ -130,9 +130,9 @@ def _unnamed(folder: Path) -> int | None:
         raise
 
 
-def _written_unnamed(partial: Path, data: bytes) -> bool:
+def _write_unnamed(partial: Path, data: bytes) -> bool:
     """Write a file without a name, and name it ``partial`` once it is whole; whether the system can."""
-    descriptor = _unnamed(partial.parent)
+    descriptor = _open_unnamed(partial.parent)
     if descriptor is None:
         return False
     with os.fdopen(descriptor, "wb") as file:
@@ -150,7 +150,7 @@ def _written_unnamed(partial: Path, data: bytes) -> bool:
     return True
 
 
-def _written_named(partial: Path, data: bytes) -> None:
+def _write_named(partial: Path, data: bytes) -> None:
     with partial.open("xb") as file:
         _fill(file, data)
 

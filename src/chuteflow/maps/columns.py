@@ -117,7 +117,7 @@ def choose_fractions(place: float, nearby: Sequence[Column], guards: int, tolera
     places = [one.place for one in nearby]
     each = zip(*(one.parts for one in nearby), strict=True)
     last = -1.0
-    for stop in sorted(stop for parts in each for stop in _expected(place, places, parts)):
+    for stop in sorted(stop for parts in each for stop in _extrapolate_stops(place, places, parts)):
         # Numbers that change together are expected to do so at nearly the same stop.
         if stop - last > 0.5 * tolerance:
             # A little more than the tolerance apart would be halved again.
@@ -126,7 +126,7 @@ def choose_fractions(place: float, nearby: Sequence[Column], guards: int, tolera
     return fractions
 
 
-def _expected(place: float, places: Sequence[float], parts: Sequence[PiecewiseConstant]) -> list[float]:
+def _extrapolate_stops(place: float, places: Sequence[float], parts: Sequence[PiecewiseConstant]) -> list[float]:
     """Stops at ``place`` by interpolation between those of columns at ``places`` that have the same values."""
     right = bisect_right(places, place)
     beside = parts[right - 1 : right + 1]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from chuteflow import display
 from chuteflow.branches.ranges import SearchRange
 from chuteflow.branches.results import Searched
-from chuteflow.checks import checked_size, number
+from chuteflow.checks import check_size, number
 from chuteflow.errors import InputError
 from chuteflow.maps.columns import (
     Classify,
@@ -105,22 +105,22 @@ class Domain(Result):
     @cached_property
     def exists(self) -> NDArray[np.bool_]:
         """Whether there is any flow in the range searched."""
-        return self._named("families") > 0
+        return self._get("families") > 0
 
     @cached_property
     def most(self) -> NDArray[np.int16]:
         """The largest number of flows that share one mass flux."""
-        return self._named("most")
+        return self._get("most")
 
     @cached_property
     def families(self) -> NDArray[np.int16]:
         """The number of branches: connected sets of flows in the range searched."""
-        return self._named("families")
+        return self._get("families")
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
         """Whether there are hidden branches: more than one, so that no continuation from one flow meets all."""
-        return self._named("families") > 1
+        return self._get("families") > 1
 
     @cached_property
     def interior(self) -> NDArray[np.int16]:
@@ -156,19 +156,19 @@ class Domain(Result):
         within = self.plane.within
         return Searched((within.coldest, within.hottest), within.deepest)
 
-    def _named(self, name: str) -> NDArray[np.int16]:
+    def _get(self, name: str) -> NDArray[np.int16]:
         return self._on_grid(self.columns, CODES.index(name))
 
     def _bits(self, kinds: dict[str, int]) -> NDArray[np.int16]:
         total = np.zeros((len(self.y), len(self.x)), dtype=np.int16)
         for name, bit in kinds.items():
-            total += self._named(name) * np.int16(bit)
+            total += self._get(name) * np.int16(bit)
         return total
 
     def _on_grid(self, columns: Sequence[Column], number: int) -> NDArray[np.int16]:
         plane = self.plane
         x, y = ((values - axis.low) / (axis.high - axis.low) for values, axis in ((self.x, plane.x), (self.y, plane.y)))
-        grid = _gridded(columns, number, self.tolerance, *((y, x) if plane.transposed else (x, y)))
+        grid = _interpolate_on_grid(columns, number, self.tolerance, *((y, x) if plane.transposed else (x, y)))
         return grid if plane.transposed else grid.T
 
 
@@ -207,7 +207,7 @@ def domain(
         InputError: for a size, tolerance, temperature or range out of bounds, or where a corner is no chute.
         ChuteflowError: where the processes cannot start, or die.
     """
-    size = checked_size(size, 1, LARGEST_SIZE)
+    size = check_size(size, 1, LARGEST_SIZE)
     tolerance = number("tolerance", tolerance)
     if not FINEST <= tolerance <= COARSEST:
         raise InputError(
@@ -300,7 +300,7 @@ def _hot_columns(plane: ParameterPlane, tolerance: float) -> list[Column]:
     return columns
 
 
-def _gridded(
+def _interpolate_on_grid(
     columns: Sequence[Column],
     number: int,
     tolerance: float,

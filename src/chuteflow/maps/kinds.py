@@ -156,7 +156,7 @@ def _monotonic_pieces(log_t: Array, log_m: Array, log_q: Array, rise: Array) -> 
     first = along if rise[0] > 0.0 else -along
     stops = [float(log_q[0]), *turned.tolist(), float(log_q[-1])]
     scatter = [0.0, *noise.tolist(), 0.0]
-    return _stretches(_confirmed(stops, first, [0.0] * len(stops))), _stretches(_confirmed(stops, first, scatter))
+    return _stretches(_confirm(stops, first, [0.0] * len(stops))), _stretches(_confirm(stops, first, scatter))
 
 
 def _places(log_t: Array, log_m: Array) -> tuple[NDArray[np.bool_], Array]:
@@ -226,7 +226,7 @@ def _changes(rise: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
     return steps[order], fractions[order]
 
 
-def _confirmed(stops: list[float], rises: float, noise: list[float]) -> list[float]:
+def _confirm(stops: list[float], rises: float, noise: list[float]) -> list[float]:
     """Values at the ends and turns of a branch without those turns between which it does not turn by more than the
     ``noise`` of either.
 

@@ -42,7 +42,7 @@ class Outline(Compared):
 
     def __repr__(self) -> str:
         between = f"between {self.values[0]} and {self.values[1]}"
-        return display.line("Outline", self.kind, between, display.counted(len(self.points), "point"))
+        return display.line("Outline", self.kind, between, display.count_of(len(self.points), "point"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Region(Compared):
     polygon: NDArray[np.float64]
 
     def __repr__(self) -> str:
-        return display.line("Region", f"value {self.value}", display.counted(len(self.polygon), "corner"))
+        return display.line("Region", f"value {self.value}", display.count_of(len(self.polygon), "corner"))
 
 
 #: Kinds of boundaries, and what changes there.
@@ -106,7 +106,7 @@ def make_regions(
 
     ``bits`` has factors of numbers of the class; the value of a region is the sum of their products.
     """
-    parts = [_summed([one.parts[number] for number in bits], list(bits.values())) for one in columns]
+    parts = [_add([one.parts[number] for number in bits], list(bits.values())) for one in columns]
     found = []
     for (left, first_part), (right, last_part) in pairwise(zip(columns, parts, strict=True)):
         pair = alike(first_part, last_part, tolerance)
@@ -125,7 +125,7 @@ def make_regions(
     return tuple(found)
 
 
-def _summed(parts: Sequence[PiecewiseConstant], factors: Sequence[int]) -> PiecewiseConstant:
+def _add(parts: Sequence[PiecewiseConstant], factors: Sequence[int]) -> PiecewiseConstant:
     """The part whose values are sums of those of ``parts``, each times its factor."""
     stops = sorted({stop for one in parts for stop in one.stops})
     inside = [0.5 * (a + b) for a, b in pairwise([-1.0, *stops, 2.0])]
@@ -214,7 +214,7 @@ def _lines(
             if pair[0] != pair[1]:
                 stretches.setdefault(_label(pair), []).append(((middle, low), (middle, high)))
     for label, pieces in stretches.items():
-        for line in _joined(pieces):
+        for line in _join(pieces):
             yield label, line
 
 
@@ -222,7 +222,7 @@ def _label(values: Sequence[int]) -> Label:
     return min(values), max(values)
 
 
-def _joined(stretches: Sequence[_Stretch]) -> Iterator[list[Point]]:
+def _join(stretches: Sequence[_Stretch]) -> Iterator[list[Point]]:
     """Lines through stretches that share a point; where more than two meet, any two are joined."""
     at: dict[Point, list[int]] = {}
     for i, ends in enumerate(stretches):

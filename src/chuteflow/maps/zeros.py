@@ -70,7 +70,7 @@ class Zeros:
         out[[0, -1]] = False
         out[1:-1] &= ~out[:-2] & ~out[2:]
         line = line[~out]
-        return line[_thinned(np.stack([self.log_q[line], self.log_m[line], self.log_t[line]], axis=1))]
+        return line[_thin(np.stack([self.log_q[line], self.log_m[line], self.log_t[line]], axis=1))]
 
     def traced(self, which: Index) -> Array:
         """The extrema (k, 3) at some of the zeros, along their trajectories as they are known between others."""
@@ -378,7 +378,7 @@ def _hermite(one: float, two: float, slope_one: float, slope_two: float, t: floa
 
 
 @compiled
-def _thinned(places: Array) -> Any:
+def _thin(places: Array) -> Any:
     """Which of successive ``places`` (k, 3) to keep, of those that lie much nearer to each other than others around:
     the first and the last, and so many between that none is near the one before."""
     count = len(places)

@@ -89,13 +89,13 @@ class PiecewiseGrid:
 
     def differentiate(self, values: Array) -> Array:
         """Derivatives at the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""
-        return self._joined(self.piece.differentiate(values[..., self.columns]) / self._widths)
+        return self._join(self.piece.differentiate(values[..., self.columns]) / self._widths)
 
     def integrate(self, values: Array) -> Array:
         """Integrals from 0 to the nodes of the piecewise polynomials through ``values`` (..., N d + 1)."""
         parts = self.piece.integrate(values[..., self.columns]) * self._widths
         parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1:], axis=-2)
-        return self._joined(parts)
+        return self._join(parts)
 
     def interpolate(self, values: Array, points: Array) -> Array:
         """The piecewise polynomials through ``values`` (..., N d + 1) at ``points`` (m,), (..., m)."""
@@ -118,7 +118,7 @@ class PiecewiseGrid:
         return np.diff(self.breaks)[:, None]
 
     @staticmethod
-    def _joined(parts: Array) -> Array:
+    def _join(parts: Array) -> Array:
         """Values (..., N, d+1) on the pieces as values at the nodes: at a break those of the piece to the left."""
         rest = parts[..., 1:].reshape(*parts.shape[:-2], -1)
         return np.concatenate([parts[..., 0, :1], rest], axis=-1)

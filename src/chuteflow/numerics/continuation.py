@@ -64,7 +64,7 @@ class System(Protocol):
 class AdaptiveSystem(System, Protocol):
     """A system that may ask for another discretisation between two steps."""
 
-    def adapted(self, z: Array, tangent: Array, /) -> tuple[Self, Array, Array] | None:
+    def adapt(self, z: Array, tangent: Array, /) -> tuple[Self, Array, Array] | None:
         """Another system with the point and its tangent carried over, or None to go on as before.
 
         The point and the tangent need to satisfy the new system only roughly: they are corrected first.
@@ -238,7 +238,7 @@ def _next_correction(last: float, before: float) -> float:
 
 def _hook(system: S) -> Callable[[Array, Array], tuple[S, Array, Array] | None]:
     """The system's ``adapted``; looked up once, since that takes as long as a factorisation."""
-    return system.adapted if isinstance(system, AdaptiveSystem) else lambda z, tangent: None
+    return system.adapt if isinstance(system, AdaptiveSystem) else lambda z, tangent: None
 
 
 class _Corrector(Generic[S]):
@@ -247,7 +247,7 @@ class _Corrector(Generic[S]):
     def __init__(self, system: S, control: ContinuationSettings) -> None:
         self.system = system
         self.metric = metric = _Metric(system.weights)
-        self.adapted = _hook(system)
+        self.adapt = _hook(system)
         self._control = control
         n = len(metric.weights)
         self._matrix = np.empty((n, n))
@@ -259,10 +259,10 @@ class _Corrector(Generic[S]):
         if self._control.parametrisation == "arclength":
             return self.metric.weights * tangent
         row = np.zeros_like(tangent)
-        row[self._held(tangent, before)] = 1.0
+        row[self._choose_held(tangent, before)] = 1.0
         return row
 
-    def _held(self, tangent: Array, before: Array | None) -> int:
+    def _choose_held(self, tangent: Array, before: Array | None) -> int:
         """The component that changes most, or the second if that rises while the first nears a fold."""
         fraction = self.metric.root * np.abs(tangent)
         first = int(fraction.argmax())
@@ -355,20 +355,20 @@ class Trace(Iterator[CurvePoint[S]]):
         if self._count == self._control.max_points:
             return ContinuationStatus.MAX_POINTS
         if self._point is None:
-            return self._started()
-        adapted = None if self._just_adapted else self._adapted(self._point)
+            return self._begin()
+        adapted = None if self._just_adapted else self._adapt(self._point)
         self._just_adapted = adapted is not None
-        return self._stepped(self._point) if adapted is None else adapted
+        return self._advance(self._point) if adapted is None else adapted
 
-    def _started(self) -> CurvePoint[S] | ContinuationStatus:
+    def _begin(self) -> CurvePoint[S] | ContinuationStatus:
         corrected = self._corrector.correct(self._start, self._direction)
         if isinstance(corrected, ContinuationStatus):
             return ContinuationStatus.START_FAILED
         return self._corrector.point(corrected, corrected.tangent, 0.0, 0.0)
 
-    def _adapted(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus | None:
+    def _adapt(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus | None:
         """The point on the discretisation that the system asks for, if it does."""
-        changed = self._corrector.adapted(point.z, point.tangent)
+        changed = self._corrector.adapt(point.z, point.tangent)
         if changed is None:
             return None
         system, z, tangent = changed
@@ -382,11 +382,11 @@ class Trace(Iterator[CurvePoint[S]]):
         tangent = corrector.metric.along(corrected.tangent, ahead)
         return corrector.point(corrected, tangent, point.arclength, 0.0)
 
-    def _stepped(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus:
+    def _advance(self, point: CurvePoint[S]) -> CurvePoint[S] | ContinuationStatus:
         """The next point; the step is halved until it succeeds, and then not allowed to grow at once."""
         control = self._control
         largest_growth = GROWTH
-        while isinstance(tried := self._tried(point, self._step), ContinuationStatus):
+        while isinstance(tried := self._try(point, self._step), ContinuationStatus):
             if self._step <= control.min_step:
                 return tried
             self._step = max(0.5 * self._step, control.min_step)
@@ -397,10 +397,10 @@ class Trace(Iterator[CurvePoint[S]]):
         self._previous = point
         return following
 
-    def _tried(self, point: CurvePoint[S], step: float) -> tuple[CurvePoint[S], float] | ContinuationStatus:
+    def _try(self, point: CurvePoint[S], step: float) -> tuple[CurvePoint[S], float] | ContinuationStatus:
         """The point one ``step`` further, and the factor by which the next step may differ."""
         corrector, metric, control = self._corrector, self._corrector.metric, self._control
-        predicted = _extrapolated(self._previous, point, step)
+        predicted = _extrapolate(self._previous, point, step)
         before = None if self._previous is None else self._previous.tangent
         corrected = corrector.correct(predicted, corrector.border(point.tangent, before))
         if isinstance(corrected, ContinuationStatus):
@@ -452,7 +452,7 @@ def _cubic(a: Array, slope_a: Array, b: Array, slope_b: Array, x: float) -> Arra
     return b + (u + square + cube) * slope_b + cube * slope_a - (square + 2.0 * cube) * (b - a)
 
 
-def _extrapolated(previous: CurvePoint[S] | None, point: CurvePoint[S], step: float) -> Array:
+def _extrapolate(previous: CurvePoint[S] | None, point: CurvePoint[S], step: float) -> Array:
     """The curve one ``step`` beyond ``point``: the cubic through the last two points, or the tangent."""
     if previous is None:
         return point.z + step * point.tangent
@@ -541,7 +541,7 @@ def locate(
     if not left.value * right.value <= 0.0 or left.value == right.value:
         raise InputError(f"The monitor is {left.value} and {right.value} at the two points: it must change its sign.")
     fine = segment.finest(tolerance)
-    bracket = _shrunk(segment, left, right, fine)
+    bracket = _shrink(segment, left, right, fine)
     if bracket.status is ContinuationStatus.LOCATED and (bracket.left is left) != (bracket.right is right):
         bracket = _beyond_the_end(segment, bracket, fine)
     left, right = bracket.left, bracket.right
@@ -553,7 +553,7 @@ def locate(
     return Located(best.point, best.value, error, bracket.status)
 
 
-def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float) -> _Bracket[S]:
+def _shrink(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float) -> _Bracket[S]:
     """The bracket of a change of sign, shrunk to twice a ``fine`` fraction of the chord, or to the noise."""
     start = right.fraction - left.fraction
     slope = (right.value - left.value) / start
@@ -573,7 +573,7 @@ def _shrunk(segment: _Segment[S], left: _Trial[S], right: _Trial[S], fine: float
         if isinstance(trial, ContinuationStatus):
             return _Bracket(left, right, slope, trial)
         outlying = not min(left.value, right.value) <= trial.value <= max(left.value, right.value)
-        left, right = _narrowed(left, trial, right)
+        left, right = _narrow(left, trial, right)
         if outlying and width <= WIDE * start:
             break  # So near the zero, only noise makes a monitor go up and down.
     return _Bracket(left, right, slope, ContinuationStatus.LOCATED)
@@ -593,12 +593,12 @@ def _beyond_the_end(segment: _Segment[S], bracket: _Bracket[S], fine: float) -> 
             break
         if outside.value * inside.value <= 0.0:
             left, right = (outside, inside) if outward < 0.0 else (inside, outside)
-            return _shrunk(segment, left, right, fine)
+            return _shrink(segment, left, right, fine)
         reach *= 4.0
     return bracket
 
 
-def _narrowed(left: _Trial[S], trial: _Trial[S], right: _Trial[S]) -> tuple[_Trial[S], _Trial[S]]:
+def _narrow(left: _Trial[S], trial: _Trial[S], right: _Trial[S]) -> tuple[_Trial[S], _Trial[S]]:
     """The part of a bracket on the one or the other side of a trial that holds the change of sign."""
     if trial.value == 0.0:
         return trial, trial

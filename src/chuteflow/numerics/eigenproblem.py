@@ -127,7 +127,7 @@ def refine_eigenvalue(matrix: Complex, weights: Array, near: complex, steps: int
 
     ``near`` is to be much closer to it than to all others, such as its value in another discretisation.
     """
-    return _Factors.of(matrix, weights, near).iterated(steps)
+    return _Factors.of(matrix, weights, near).iterate(steps)
 
 
 def refine_eigenpair(
@@ -135,7 +135,7 @@ def refine_eigenpair(
 ) -> Eigenpair:
     """The same with the left vector, from the same factors; ``start`` is a vector that is close to the right one."""
     factors = _Factors.of(matrix, weights, near)
-    value, right = factors.iterated(steps, start)
+    value, right = factors.iterate(steps, start)
     return Eigenpair(value, right, factors.left(right))
 
 
@@ -157,7 +157,7 @@ class _Factors:
         size = np.abs(shifted).max(axis=1)
         return cls(shift, weights, size, lu_factor(shifted / size[:, None], check_finite=False))
 
-    def iterated(self, steps: int, start: Complex | None = None) -> tuple[complex, Complex]:
+    def iterate(self, steps: int, start: Complex | None = None) -> tuple[complex, Complex]:
         right = self.weights / self.size
         live = self.weights != 0.0
         vector = np.exp(1j * np.arange(len(self.weights))) if start is None else start

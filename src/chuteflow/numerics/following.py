@@ -85,12 +85,12 @@ def follow_both_sides(follow: Callable[[float], Side[P]]) -> FollowedCurve[P]:
     """
     onward = follow(1.0)
     if onward.closed:
-        return _joined([*onward.found, onward.found[0]], (onward.end, onward.end))
+        return _join([*onward.found, onward.found[0]], (onward.end, onward.end))
     back = follow(-1.0)
-    return _joined([*back.found[:0:-1], *onward.found], (back.end, onward.end))
+    return _join([*back.found[:0:-1], *onward.found], (back.end, onward.end))
 
 
-def _joined(found: list[tuple[str, P]], ends: tuple[str, str]) -> FollowedCurve[P]:
+def _join(found: list[tuple[str, P]], ends: tuple[str, str]) -> FollowedCurve[P]:
     points: list[P] = []
     events: list[Event[P]] = []
     for kind, point in found:

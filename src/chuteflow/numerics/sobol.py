@@ -45,7 +45,7 @@ class Sobol:
         self._shift = np.zeros(dimensions, dtype=np.uint64)
         if seed is not None:
             source = np.random.default_rng(seed)
-            self._directions = np.stack([_mixed(source, row) for row in self._directions])
+            self._directions = np.stack([_mix(source, row) for row in self._directions])
             self._shift = source.integers(0, 1 << BITS, dimensions, dtype=np.uint64)
 
     def points(self, first: int, last: int) -> Array:
@@ -74,7 +74,7 @@ def _directions(dimension: int) -> list[int]:
     return [one << (BITS - 1 - j) for j, one in enumerate(m)]
 
 
-def _mixed(source: np.random.Generator, directions: Whole) -> Whole:
+def _mix(source: np.random.Generator, directions: Whole) -> Whole:
     """Direction numbers after a random lower triangular map of their digits, with ones on its diagonal."""
     places = np.arange(BITS - 1, -1, -1, dtype=np.uint64)
     digits = (directions >> places[:, None]) & np.uint64(1)

@@ -12,7 +12,7 @@ import numpy as np
 from chuteflow import Chute
 from chuteflow.branches.counting import flows_at_flux
 from chuteflow.branches.lines import NUMBERS, SteadyBranch, in_order, runs, smooth
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stack
 from chuteflow.paper.sources import Source, SteadyCurve, reach
 from chuteflow.plotting import style
 
@@ -36,7 +36,7 @@ class Curves:
             for name, found in self.curves.items()
             for number, branch in enumerate(found.branches, 1)
         }
-        columns = stacked(self.key, groups)
+        columns = stack(self.key, groups)
         columns[self.key] = [name for name, _ in columns[self.key]]
         notes = [note for found in self.curves.values() for note in (chute_note(found.chute), *reach(found))]
         return FigureTable(self.title, tuple(notes), columns)

@@ -30,7 +30,7 @@ class FigureData(Protocol):
         ...
 
 
-def stacked(key: str, groups: Mapping[Any, Mapping[str, Any]]) -> dict[str, Any]:
+def stack(key: str, groups: Mapping[Any, Mapping[str, Any]]) -> dict[str, Any]:
     """Columns of several groups one below the other, after a column ``key`` with the names of the groups."""
     names = next(iter(groups.values())).keys()
     sizes = {group: len(next(iter(columns.values()))) for group, columns in groups.items()}

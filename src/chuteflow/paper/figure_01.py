@@ -72,11 +72,11 @@ def draw(data: Figure1) -> Figure:
     ax.set_axis_off()
     ax.set_aspect("equal")
     for place in data.grains:
-        ax.add_patch(Circle(tuple(_turned(place)), 0.5, facecolor="#f0f0f0", edgecolor="#a8a8a8", linewidth=0.5))
+        ax.add_patch(Circle(tuple(_turn(place)), 0.5, facecolor="#f0f0f0", edgecolor="#a8a8a8", linewidth=0.5))
     for place in np.arange(0.5, LENGTH, 1.0):  # the rough base
-        ax.add_patch(Circle(tuple(_turned((place, -0.5))), 0.5, facecolor=style.GREY, edgecolor=style.GREY))
+        ax.add_patch(Circle(tuple(_turn((place, -0.5))), 0.5, facecolor=style.GREY, edgecolor=style.GREY))
     _line(ax, (0.0, -1.0), (LENGTH, -1.0))
-    foot = _turned((LENGTH, -1.0))
+    foot = _turn((LENGTH, -1.0))
     ax.plot([foot[0] - 8.5, foot[0]], [foot[1], foot[1]], **style.LineStyle(style.BLACK, style.DASHED).line(0.8))
     sweep = np.radians(np.linspace(180.0 - ANGLE, 180.0, 40))
     ax.plot(foot[0] + 6.0 * np.cos(sweep), foot[1] + 6.0 * np.sin(sweep), **style.LineStyle().line(0.8))
@@ -88,15 +88,15 @@ def draw(data: Figure1) -> Figure:
     for height, end in zip(ARROWS, ends, strict=True):
         _arrow(ax, (ARROWS_AT, height), (end, height), "", (0.0, 0.0), style.VERMILION)
     _line(ax, (ARROWS_AT, 0.0), (ARROWS_AT, ARROWS[-1] + 0.4), style.VERMILION)
-    x, y = _turned(np.column_stack([ends, ARROWS])).T
+    x, y = _turn(np.column_stack([ends, ARROWS])).T
     ax.plot(x, y, **style.LineStyle(style.VERMILION).line(1.0))
-    x, y = _turned((ends[-1], ARROWS[-1]))
+    x, y = _turn((ends[-1], ARROWS[-1]))
     style.write(ax, x, y, "$u(z)$", xytext=(4.0, 2.0), color=style.VERMILION, fontsize=11)
     ax.set(xlim=(-1.5, LENGTH + 4.0), ylim=(foot[1] - 1.0, 8.0))
     return figure
 
 
-def _turned(place: Any) -> Any:
+def _turn(place: Any) -> Any:
     """Places (..., 2) of the chute, as they lie on the page."""
     angle = np.radians(ANGLE)
     return np.asarray(place) @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -108,12 +108,12 @@ def _back(direction: Any) -> Any:
 
 
 def _line(ax: Axes, start: Any, end: Any, colour: str = style.BLACK) -> None:
-    x, y = _turned(np.array([start, end])).T
+    x, y = _turn(np.array([start, end])).T
     ax.plot(x, y, **style.LineStyle(colour).line(1.0))
 
 
 def _arrow(ax: Axes, start: Any, end: Any, name: str, offset: tuple[float, float], colour: str = style.BLACK) -> None:
-    tail, head = _turned(start), _turned(end)
+    tail, head = _turn(start), _turn(end)
     properties = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.0, "shrinkA": 0.0, "shrinkB": 0.0}
     ax.annotate("", tuple(head), tuple(tail), arrowprops=properties)
     if name:

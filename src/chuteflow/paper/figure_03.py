@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chuteflow.branches.lines import NUMBERS, SteadyBranch, SteadyFlow, in_order
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stack
 from chuteflow.paper.materials import dissipative
 from chuteflow.paper.sources import OVERBURDEN, SURFACE_TEMPERATURE, Source, SteadyCurve, reach
 from chuteflow.plotting import style
@@ -50,7 +50,7 @@ class Figure3:
         ends = [f"family {i} ends: {', and '.join(branch.ends)}" for i, branch in enumerate(self.curve.branches, 1)]
         title = "Figure 3: centre of mass, mass hold-up and mass flux of all flows"
         return FigureTable(
-            title, (chute_note(self.curve.chute), *reach(self.curve), *ends, *special), stacked("flows", groups)
+            title, (chute_note(self.curve.chute), *reach(self.curve), *ends, *special), stack("flows", groups)
         )
 
 

@@ -69,7 +69,7 @@ def figure(number: int) -> FigureModule:
     return cast("FigureModule", import_module(f"chuteflow.paper.figure_{number:02d}"))
 
 
-def computed(number: int, source: Source) -> FigureData:
+def compute(number: int, source: Source) -> FigureData:
     """The data of figure ``number`` from the flows of ``source``."""
     module = figure(number)
     return module.compute() if number in WITHOUT_METHOD else module.compute(source)

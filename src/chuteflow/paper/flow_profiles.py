@@ -10,7 +10,7 @@ import numpy as np
 
 from chuteflow import Chute, Profile
 from chuteflow.branches.lines import SteadyFlow
-from chuteflow.paper.data import FigureTable, chute_note, stacked
+from chuteflow.paper.data import FigureTable, chute_note, stack
 from chuteflow.paper.sources import Source
 
 MASS_FLUX = 3.0
@@ -35,7 +35,7 @@ class FlowProfiles:
 
     def table(self) -> FigureTable:
         """The profiles, one below the other."""
-        columns = stacked(
+        columns = stack(
             "flow",
             {
                 key: {field: getattr(profile, field) for field in ("height", *self.fields)}

@@ -55,10 +55,10 @@ def hot_profiles(
     """The hot flow at T_inf = ``temperature`` against the ``fields`` psi, tau and U of the reduced system at ``z``."""
     parameters = hot(chute).parameters
     flow = source.flows(chute, T_surface=temperature)[0]
-    return HotProfiles(title, flow, parameters.lambda_, flow.profile(z), _scaled(parameters, temperature, *fields))
+    return HotProfiles(title, flow, parameters.lambda_, flow.profile(z), _scale(parameters, temperature, *fields))
 
 
-def _scaled(parameters: HotParameters, temperature: float, psi: Any, tau: Any, U: Any) -> dict[str, Any]:
+def _scale(parameters: HotParameters, temperature: float, psi: Any, tau: Any, U: Any) -> dict[str, Any]:
     return {
         "volume_fraction": parameters.alpha / temperature * psi,
         "granular_temperature": temperature * tau,

@@ -75,7 +75,7 @@ def page(report: Report) -> str:
     sections = [_summary(report)]
     if report.verdicts:
         sections.append(_claims(report.verdicts))
-    sections += [_figures(report.figures), _made_with(report)]
+    sections += [_figures(report.figures), _describe_versions(report)]
     return "\n".join(
         [
             "<!doctype html>",
@@ -175,7 +175,7 @@ def _figure(found: ShownFigure) -> str:
     )
 
 
-def _made_with(report: Report) -> str:
+def _describe_versions(report: Report) -> str:
     rows = [*versions().items()]
     rows += [
         ("date", report.started.strftime("%Y-%m-%d %H:%M:%S %Z")),

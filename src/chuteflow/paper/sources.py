@@ -137,7 +137,7 @@ class Mapped:
         new = [chute for chute in chutes if (chute, surface_temperature) not in self._known]
         ranges = [surface_temperature] * len(new)
         if self.workers > 1 and len(new) > 1:
-            found = _shared_out(self.workers, new, ranges)
+            found = _distribute(self.workers, new, ranges)
         else:
             found = map(mapped_branches, new, ranges)
         for chute, branches in zip(new, found, strict=True):
@@ -169,7 +169,7 @@ def mapped_branches(chute: Chute, surface_temperature: tuple[float, float]) -> M
     return MappedCurves(chute, surface_temperature, tuple(reached), tuple(unreached))
 
 
-def _shared_out(workers: int, chutes: Sequence[Chute], ranges: Sequence[tuple[float, float]]) -> Sequence[MappedCurves]:
+def _distribute(workers: int, chutes: Sequence[Chute], ranges: Sequence[tuple[float, float]]) -> Sequence[MappedCurves]:
     """:func:`mapped_branches` in processes of their own."""
     with worker_pool(min(workers, len(chutes))) as pool:
         return list(pool.map(mapped_branches, chutes, ranges))

@@ -45,7 +45,7 @@ def plot(result: Any, *, scales: Scales | None = None, theme: str = "print", **o
         InputError: for a result without a picture, or an option that it does not have.
     """
     try:
-        figure = style.themed(drawn(result, scales, **options), theme)
+        figure = style.apply_theme(drawn(result, scales, **options), theme)
     except TypeError as error:
         if "unexpected keyword argument" not in str(error):
             raise

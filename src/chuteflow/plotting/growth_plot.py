@@ -36,7 +36,7 @@ def plot_wave_map(found: WaveMap, *, scales: Scales | None = None) -> Figure:
     chute = found.flow.chute
     wave = factor("wavenumber", chute, scales)
     kx, ky = wave * found.kx, wave * found.ky
-    _shaded(figure, ax, kx, ky, factor("growth", chute, scales) * found.growth, found.unresolved, scales)
+    _shade(figure, ax, kx, ky, factor("growth", chute, scales) * found.growth, found.unresolved, scales)
     for curve in found.neutral:
         ax.plot(*(wave * curve.z.T), **_NEUTRAL.line(1.6))
     growth = np.where(found.grows, found.growth, -np.inf)
@@ -52,7 +52,7 @@ def plot_wave_map(found: WaveMap, *, scales: Scales | None = None) -> Figure:
         f"${NUMBERS[name].latex} = {value * factor(name, chute, scales):.4g}${style.unit(name, scales)}"
         for name, value in numbers.items()
     )
-    style.caption(figure, f"{parameters(chute)}\n{place}; bold: neutral{_hatched(found.growth)}")
+    style.caption(figure, f"{parameters(chute)}\n{place}; bold: neutral{_describe_hatches(found.growth)}")
     return figure
 
 
@@ -64,7 +64,7 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
     rate, heat, flux_scale = (factor(name, chute, scales) for name in ("growth", "surface_temperature", "mass_flux"))
     temperature = heat * np.array([flow.surface_temperature for flow in found.flows])
     place = np.linspace(0.0, 1.0, len(temperature))
-    _shaded(figure, left, found.depth_wavenumber, place, rate * found.growth, found.unresolved, scales)
+    _shade(figure, left, found.depth_wavenumber, place, rate * found.growth, found.unresolved, scales)
     style.logarithmic(left, "x")
     ticks = _round_places(place, temperature)
     left.set_yticks([*ticks], [*ticks.values()])
@@ -82,7 +82,7 @@ def plot_family_map(found: FamilyMap, *, scales: Scales | None = None) -> Figure
     waves = {0.0: "waves along the slope", 90.0: "waves across the slope"}.get(
         found.angle, f"waves at {found.angle:g} degrees to the slope"
     )
-    style.caption(figure, f"{parameters(chute)}; {waves}; bold: neutral{_hatched(found.growth)}")
+    style.caption(figure, f"{parameters(chute)}; {waves}; bold: neutral{_describe_hatches(found.growth)}")
     return figure
 
 
@@ -111,11 +111,11 @@ def _round_places(place: Any, temperature: Any) -> dict[float, str]:
     return found
 
 
-def _hatched(growth: Any) -> str:
+def _describe_hatches(growth: Any) -> str:
     return "" if np.isfinite(growth).all() else "; hatched: no mode resolved"
 
 
-def _shaded(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any, scales: Scales | None) -> None:
+def _shade(figure: Figure, ax: Axes, x: Any, y: Any, growth: Any, unresolved: Any, scales: Scales | None) -> None:
     """Shades that are white at zero growth, hatches where no mode is resolved, and crosses where growth is not
     known."""
     from matplotlib.patches import Rectangle

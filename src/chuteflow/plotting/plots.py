@@ -154,7 +154,7 @@ def parameters(chute: Chute, *left_out: str) -> str:
 
 
 def _numbers_of(flow: Flow, chute: Chute, scales: Scales | None) -> str:
-    units = {name: "" if scales is None else f" {style.printed(NUMBERS[name].unit)}" for name in PLACE}
+    units = {name: "" if scales is None else f" {style.format_unit(NUMBERS[name].unit)}" for name in PLACE}
     return ", ".join(
         f"${NUMBERS[name].latex} = {style.in_formula(number(value))}${units[name]}"
         for name in PLACE

@@ -123,7 +123,7 @@ def require_theme(name: str) -> None:
         raise InputError(f"unknown theme {name!r}: choose one of {', '.join(THEMES)}")
 
 
-def themed(figure: Figure, name: str) -> Figure:
+def apply_theme(figure: Figure, name: str) -> Figure:
     """``figure``, which is in the look of print, in that of the theme ``name``.
 
     Raises:
@@ -203,7 +203,7 @@ def label(name: str, scales: Scales | None = None) -> str:
 def unit(name: str, scales: Scales | None) -> str:
     """The unit of a quantity in brackets, with a space before; nothing without scales or unit."""
     quantity = SCALED[name]
-    return "" if scales is None or quantity.unit == "1" else f" ({printed(quantity.unit)})"
+    return "" if scales is None or quantity.unit == "1" else f" ({format_unit(quantity.unit)})"
 
 
 def name_axes(ax: Axes, x: str | None, y: str | None) -> None:
@@ -303,7 +303,7 @@ def sentence(text: str) -> Figure:
     return figure
 
 
-def printed(unit: str) -> str:
+def format_unit(unit: str) -> str:
     """A unit as it is printed, with powers raised."""
     return re.sub(r"\^(\d)", r"$^{\1}$", unit)
 

@@ -68,7 +68,7 @@ class StabilityRun:
     flows: tuple[Flow, ...]
 
     def __repr__(self) -> str:
-        return display.line("StabilityRun", self.label, display.counted(len(self.flows), "flow"))
+        return display.line("StabilityRun", self.label, display.count_of(len(self.flows), "flow"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class MarkedBranch:
 
     def __repr__(self) -> str:
         labels = ", ".join(run.label for run in self.runs)
-        return display.line("MarkedBranch", f"{display.counted(len(self.samples), 'flow')} examined: {labels}")
+        return display.line("MarkedBranch", f"{display.count_of(len(self.samples), 'flow')} examined: {labels}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class MarkedCurve:
     branches: tuple[MarkedBranch, ...]
 
     def __repr__(self) -> str:
-        examined = display.counted(sum(len(branch.samples) for branch in self.branches), "flow")
+        examined = display.count_of(sum(len(branch.samples) for branch in self.branches), "flow")
         return display.line("MarkedCurve", f"{examined} examined", repr(self.curve)[1:-1])
 
 
@@ -135,11 +135,11 @@ def mark_stability(
             if progress is not None:
                 progress((done + fraction) / len(curve.branches))
 
-        found.append(_marked(branch, samples, show_progress))
+        found.append(_mark(branch, samples, show_progress))
     return MarkedCurve(replace(curve, branches=tuple(one.branch for one in found)), tuple(found))
 
 
-def _marked(branch: Branch, samples: int, show_progress: Callable[[float], None]) -> MarkedBranch:
+def _mark(branch: Branch, samples: int, show_progress: Callable[[float], None]) -> MarkedBranch:
     places = np.unique(np.linspace(0, len(branch.flows) - 1, min(samples, len(branch.flows))).round()).tolist()
     examined: list[Sample] = []
     for place in places:

@@ -206,7 +206,7 @@ def _stiffness(base: BaseState, law: Material) -> Array:
 
 def _terms(at: _Disturbed) -> list[Term]:
     """All terms, in the order of TERMS."""
-    return [*_kinetic(at), *_thermal(at), *_exchanged(at), *_at_the_ends(at)]
+    return [*_kinetic(at), *_thermal(at), *_exchange_terms(at), *_at_the_ends(at)]
 
 
 def _kinetic(at: _Disturbed) -> list[Term]:
@@ -230,7 +230,7 @@ def _thermal(at: _Disturbed) -> list[Term]:
     ]
 
 
-def _exchanged(at: _Disturbed) -> list[Term]:
+def _exchange_terms(at: _Disturbed) -> list[Term]:
     """What the pressure passes on, and what comes from the fields and the weight of the steady flow."""
     profile, d_dz = at.base.profile, at.base.derivative
     nu, T = profile.volume_fraction, profile.granular_temperature

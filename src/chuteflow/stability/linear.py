@@ -147,7 +147,7 @@ def operator(base: BaseState) -> Operator:
     Raises:
         InputError: where the problem cannot be posed, see :func:`grains`.
     """
-    parts, weights = zip(*(_linearised(base, kx, ky) for kx, ky in _SAMPLES), strict=True)
+    parts, weights = zip(*(_linearise(base, kx, ky) for kx, ky in _SAMPLES), strict=True)
     fit = np.linalg.inv(_monomials(*_SAMPLES.T).T)
     powers: Complex = np.tensordot(np.round(fit, 12).astype(complex), np.array(parts), axes=1)
     flux = base.profile.granular_temperature[0] * _conductivity(base)
@@ -162,7 +162,7 @@ def _steady(base: BaseState) -> Fields:
     )
 
 
-def _linearised(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
+def _linearise(base: BaseState, kx: float, ky: float) -> tuple[Complex, Array]:
     """A without the gas above the grid, and the weights of the time derivatives."""
     steady = _steady(base)
     values = np.array([steady.log_density, *steady.velocity, steady.log_temperature])

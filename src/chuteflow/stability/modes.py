@@ -188,7 +188,7 @@ class Disturbances:
         found: list[Mode] = []
         finest = level == len(DEGREES) - 1
         for candidate in self.candidates(kx, ky, level):
-            mode, drift = self._compared(kx, ky, complex(candidate), level)
+            mode, drift = self._compare(kx, ky, complex(candidate), level)
             if mode is not None:
                 found.append(mode)
             elif candidate.real > self.smallest_rate and not found and (not finest or drift < _ARTEFACT):
@@ -211,7 +211,7 @@ class Disturbances:
         """Eigenvalues of the coarse grid that may be modes, fastest growing first; not yet checked on another."""
         return self._candidates(self.coarse_operator(kx, ky, level), kx, ky)
 
-    def screened(self, kx: float, ky: float) -> Complex:
+    def screen(self, kx: float, ky: float) -> Complex:
         """The same on a coarser grid: rates to a few per cent where flows are not very cold, much faster."""
         usual = self._resolutions(kx, ky, 0)[0]
         degree = round(usual.degree * _SCREEN / DEGREES[0][0])
@@ -232,9 +232,9 @@ class Disturbances:
 
     def checked(self, kx: float, ky: float, candidate: complex, level: int = 0) -> Mode | None:
         """The mode on the fine grid that ``candidate`` of the coarse one stands for, or None if there is none."""
-        return self._compared(kx, ky, candidate, level)[0]
+        return self._compare(kx, ky, candidate, level)[0]
 
-    def _compared(self, kx: float, ky: float, candidate: complex, level: int) -> tuple[Mode | None, float]:
+    def _compare(self, kx: float, ky: float, candidate: complex, level: int) -> tuple[Mode | None, float]:
         """The same, and the change between the grids in fractions of the distance to the continuous spectrum."""
         coarse, fine = self._resolutions(kx, ky, level)
         of = self.operator(fine)

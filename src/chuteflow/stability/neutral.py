@@ -95,7 +95,7 @@ class NeutralCurve(Compared):
     ends: tuple[str, str]
 
     def __repr__(self) -> str:
-        return display.line("NeutralCurve", display.counted(len(self.z), "point"), f"begins at {self.ends[0]}")
+        return display.line("NeutralCurve", display.count_of(len(self.z), "point"), f"begins at {self.ends[0]}")
 
 
 def neutral_curves(
@@ -104,7 +104,7 @@ def neutral_curves(
     """All neutral curves that ``scan`` sees in ``plane``."""
     found: list[NeutralCurve] = []
     for line in _lines(scan):
-        curve = _entered(plane, scan, line, found, control)
+        curve = _enter(plane, scan, line, found, control)
         if curve is not None:
             found.append(curve)
     return found
@@ -123,7 +123,7 @@ def _lines(scan: EigenvalueGrid) -> list[Array]:
     return sorted((np.asarray(line) for line in lines), key=len, reverse=True)
 
 
-def _entered(
+def _enter(
     plane: NeutralPlane, scan: EigenvalueGrid, line: Array, found: Sequence[NeutralCurve], control: ContinuationSettings
 ) -> NeutralCurve | None:
     """The neutral curve near a rough one; None if it is among those found, or cannot be entered."""
@@ -193,14 +193,14 @@ def _side(
     def extend(
         side: Side[_Neutral], previous: CurvePoint[_GrowthSystem] | None, point: CurvePoint[_GrowthSystem]
     ) -> None:
-        edge = _edge_passed(plane, point.z)
+        edge = _find_edge_passed(plane, point.z)
         if edge is not None:
             if previous is not None:
                 for last in _at_edge(system, previous.z, point.z, *edge, control):
                     side.add(last)
             side.stop(End.EDGE)
             return
-        neutral = system.followed_to(point.z)
+        neutral = system.follow_to(point.z)
         if neutral.error > _ASTRAY:
             side.stop(End.CONTINUOUS)
             return
@@ -216,7 +216,7 @@ def _side(
     return side
 
 
-def _edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
+def _find_edge_passed(plane: NeutralPlane, z: Array) -> tuple[int, float] | None:
     """The coordinate that is outside the plane, and the edge that it has passed."""
     for i, end in enumerate(plane.size):
         if z[i] < 0.0:
@@ -234,7 +234,7 @@ def _at_edge(
     direction = np.eye(2)[which]
     for point in trace(system, inside + fraction * (outside - inside), direction=direction, control=control):
         z = np.where(direction > 0.0, edge, point.z)
-        neutral = system.followed_to(z)
+        neutral = system.follow_to(z)
         if neutral.error <= _ASTRAY:
             yield neutral
         return
@@ -277,19 +277,19 @@ class _GrowthSystem:
 
     def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
         """See chuteflow.numerics.continuation.System."""
-        there = self._followed(z)
+        there = self._follow(z)
         if self._accepted.same_mode(there):
             self._trial = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
 
-    def followed_to(self, z: Array) -> _Neutral:
+    def follow_to(self, z: Array) -> _Neutral:
         """The point, from which the next ones start, with its error: growth on the finest grid over its slope."""
-        self._accepted = self._trial = there = self._followed(z)
+        self._accepted = self._trial = there = self._follow(z)
         growth = self._sigma(z, there.sigma, _FINEST).real - there.sigma.real
         steepness = float(np.hypot(*np.real(there.slope)))
         return _Neutral(z, there.sigma, abs(growth) / steepness if steepness > 0.0 else np.inf)
 
-    def _followed(self, z: Array) -> _Eigenvalue:
+    def _follow(self, z: Array) -> _Eigenvalue:
         nearest = min((self._trial, self._accepted), key=lambda known: float(np.abs(known.z - z).max()))
         return self._with_slope(z, nearest.at(z))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chuteflow import display
 from chuteflow.branches.paths import flow_between
-from chuteflow.checks import checked_size, number, pair
+from chuteflow.checks import check_size, number, pair
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
@@ -143,7 +143,7 @@ class WaveMap(Result):
 
     def __repr__(self) -> str:
         reach = (display.span("kx", self.kx), display.span("ky", self.ky), display.span("growth", self.growth.flat))
-        return display.line("WaveMap", *reach, display.counted(len(self.neutral), "neutral curve"))
+        return display.line("WaveMap", *reach, display.count_of(len(self.neutral), "neutral curve"))
 
     def _repr_html_(self) -> str:
         return display.html_table(repr(self)[1:-1], _HEADER, _rows(self.neutral))
@@ -172,7 +172,7 @@ class FamilyMap(Result):
 
     def __repr__(self) -> str:
         reach = (display.span("k h", self.depth_wavenumber), display.span("growth", self.growth.flat))
-        flows, curves = display.counted(len(self.flows), "flow"), display.counted(len(self.neutral), "neutral curve")
+        flows, curves = display.count_of(len(self.flows), "flow"), display.count_of(len(self.neutral), "neutral curve")
         return display.line("FamilyMap", f"{flows}, waves at {self.angle:g} degrees", *reach, curves)
 
     def _repr_html_(self) -> str:
@@ -300,7 +300,7 @@ def _usual(flow: Flow) -> float:
 
 
 def _check_size(size: tuple[int, int]) -> None:
-    checked_size(size, 4, _MOST_POINTS)
+    check_size(size, 4, _MOST_POINTS)
 
 
 def _check_range(name: str, low: float, high: float) -> None:

@@ -72,7 +72,7 @@ class Relaxation(Result):
         end = self.outcome
         came = "at rest" if end.arrested else None if end.nearest is None else f"{100.0 * end.distance:.2g} % away from"
         target = None if end.nearest is None or end.arrested else f"{came} {end.steady[end.nearest].name}"
-        moments = display.counted(len(self.moments), "moment")
+        moments = display.count_of(len(self.moments), "moment")
         return display.line("Relaxation", moments, target or came, t=self.moments[-1].time)
 
     def _repr_html_(self) -> str:

@@ -121,7 +121,7 @@ class _ModeSearch:
         """Scan, ascend, and settle what seems to grow faster than the best maximum."""
         logs = np.linspace(*self.bounds, SCAN)
         angles = np.radians(ANGLES) if self.free else np.zeros(1)
-        sheets = self._scanned(logs, angles)
+        sheets = self._scan(logs, angles)
         if self.free:
             self._take_uniform()
         self._take_best(self._maxima(_starts(logs, angles, sheets)))
@@ -131,11 +131,11 @@ class _ModeSearch:
         self._polish()
         return FastestMode(self.best, tuple(dict.fromkeys(self.unresolved)), sheets[0].size)
 
-    def _scanned(self, logs: Array, angles: Array) -> Complex:
+    def _scan(self, logs: Array, angles: Array) -> Complex:
         """The leading eigenvalues of the coarsest grid, (_SHEETS, m, n); NaN where there are fewer."""
         sheets = np.full((_SHEETS, len(logs), len(angles)), complex(np.nan, np.nan))
         cold = self.disturbances.is_cold
-        seen = self.disturbances.candidates if cold else self.disturbances.screened
+        seen = self.disturbances.candidates if cold else self.disturbances.screen
         for i, log_k in enumerate(logs):
             for j, angle in enumerate(angles):
                 values = seen(*self.wave(log_k, angle))[:_SHEETS]
@@ -173,7 +173,7 @@ class _ModeSearch:
     def _take_longest(self) -> None:
         """The longest waves: where nothing grows, they are often the slowest to decay, too near to 0 for the scan."""
         for angle in (0.0, 0.5 * np.pi) if self.free else (0.0,):
-            self._take(self._known(_SearchPoint(self.bounds[0], angle, 0j)))
+            self._take(self._find_known(_SearchPoint(self.bounds[0], angle, 0j)))
 
     def _take(self, mode: Mode | None) -> None:
         if mode is not None and (self.best is None or mode.growth > self.best.growth):
@@ -182,7 +182,7 @@ class _ModeSearch:
     def _maxima(self, starts: list[_SearchPoint]) -> list[_SearchPoint]:
         """Where the ascents end, highest first, each once."""
         out: list[_SearchPoint] = []
-        ends = chain.from_iterable(map(self._ascended, starts))
+        ends = chain.from_iterable(map(self._ascend, starts))
         for maximum in sorted(ends, key=lambda place: -place.sigma.real):
             if not any(maximum.is_same(other) for other in out):
                 out.append(maximum)
@@ -198,13 +198,13 @@ class _ModeSearch:
     def _certify(self, maximum: _SearchPoint) -> None:
         """Take the leading mode at a maximum; where another one leads there, go on by that."""
         for _ in range(_ANEW):
-            mode = self._known(maximum)
+            mode = self._find_known(maximum)
             self._take(mode)
             if mode is None or mode.growth < maximum.sigma.real + _GAIN * abs(maximum.sigma.real):
                 return
-            maximum = self._ascended(_SearchPoint(maximum.log_k, maximum.angle, mode.sigma))[-1]
+            maximum = self._ascend(_SearchPoint(maximum.log_k, maximum.angle, mode.sigma))[-1]
 
-    def _known(self, place: _SearchPoint) -> Mode | None:
+    def _find_known(self, place: _SearchPoint) -> Mode | None:
         """The leading mode at a place; where that is not told, the one of the place, if it is a mode."""
         kx, ky = self.wave(place.log_k, place.angle)
         try:
@@ -233,7 +233,7 @@ class _ModeSearch:
                 self.unresolved.append(wave)
                 continue
             if found and (self.best is None or found[0].growth > self.best.growth):
-                for maximum in self._ascended(_SearchPoint(float(logs[i]), float(angles[j]), found[0].sigma)):
+                for maximum in self._ascend(_SearchPoint(float(logs[i]), float(angles[j]), found[0].sigma)):
                     self._certify(maximum)
 
     def _polish(self) -> None:
@@ -247,12 +247,12 @@ class _ModeSearch:
         start = _SearchPoint(float(np.log(k)), angle, mode.sigma)
         turning = self.free and min(angle, 0.5 * np.pi - angle) > _ALIGNED
         maximum = _GrowthMaximisation(self, start, mode.operator).maximum(start, turning=turning, accuracy=_EXACT)
-        polished = self._known(maximum)
+        polished = self._find_known(maximum)
         # Near the maximum rates differ by less than their errors: the maximum is where the slope vanishes.
         if polished is not None and polished.growth > mode.growth - max(mode.error, polished.error):
             self.best = polished
 
-    def _ascended(self, start: _SearchPoint) -> list[_SearchPoint]:
+    def _ascend(self, start: _SearchPoint) -> list[_SearchPoint]:
         """The maxima that a mode leads to: from an axis that along it, and one aside if it is higher there."""
         ascent = _GrowthMaximisation(self, start)
         if not self.free or min(start.angle, 0.5 * np.pi - start.angle) > _ALIGNED:
@@ -276,7 +276,7 @@ class _GrowthMaximisation:
     def __init__(self, search: _ModeSearch, start: _SearchPoint, of: Operator | None = None) -> None:
         self.search = search
         self.of = of or search.disturbances.coarse_operator(*search.wave(start.log_k, start.angle))
-        self.known = [self._followed(start.log_k, start.angle, start)]
+        self.known = [self._follow(start.log_k, start.angle, start)]
 
     def at(self, log_k: float, angle: float) -> _SearchPoint | None:
         """The mode at a place; None where it is lost on the way."""
@@ -285,7 +285,7 @@ class _GrowthMaximisation:
         while (left := here.distance(log_k, angle)) > 0.0:
             fraction = min(1.0, step / left)
             ahead = here.log_k + fraction * (log_k - here.log_k), here.angle + fraction * (angle - here.angle)
-            there = self._followed(*((log_k, angle) if fraction == 1.0 else ahead), here)
+            there = self._follow(*((log_k, angle) if fraction == 1.0 else ahead), here)
             if self._alike(here, there):
                 self.known.append(there)
                 here, step = there, min(2.0 * step, _STEP)
@@ -300,7 +300,7 @@ class _GrowthMaximisation:
         assert other.pair is not None
         return one.pair.likeness(other.pair, self.of.weights) > _LIKENESS
 
-    def _followed(self, log_k: float, angle: float, origin: _SearchPoint) -> _SearchPoint:
+    def _follow(self, log_k: float, angle: float, origin: _SearchPoint) -> _SearchPoint:
         of = self.of
         kx, ky = self.search.wave(log_k, angle)
         start = None if origin.pair is None else origin.pair.right

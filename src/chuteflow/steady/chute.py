@@ -47,7 +47,7 @@ class Chute:
 
     def __post_init__(self) -> None:
         for name, parameter in PARAMETERS.items():
-            check = base(self.base).checked_roughness if name == "roughness" else parameter.checked
+            check = base(self.base).check_roughness if name == "roughness" else parameter.checked
             object.__setattr__(self, name, check(getattr(self, name)))
         if self.surface not in SURFACES:
             raise InputError(f"unknown surface {self.surface!r}: choose one of {', '.join(SURFACES)}")

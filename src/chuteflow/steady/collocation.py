@@ -145,7 +145,7 @@ class Collocation:
         """Everything pointwise at unknowns ``z``."""
         return State(self, z)
 
-    def transferred(self, degree: int, stretch: Array | float | None = None) -> tuple[Collocation, Array]:
+    def transfer(self, degree: int, stretch: Array | float | None = None) -> tuple[Collocation, Array]:
         """The problem on another grid, and the matrix that takes g to its nodes."""
         same = stretch is None or stretch is self.stretch or np.array_equal(stretch, self.stretch)
         if same and self.breaks == WHOLE:
@@ -174,7 +174,7 @@ class State:
         nodes = len(problem.grid.nodes)
         self.g = z[..., :nodes]
         self.mass = mass = np.exp(z[..., -1:])
-        self.fraction = m, dm = self._moved(z[nodes:-2]) if problem.pins else problem.fraction
+        self.fraction = m, dm = self._move(z[nodes:-2]) if problem.pins else problem.fraction
         self.theta = z[..., -2:-1] + problem.grid.integrate(self.g * dm)
         self.overburden = mass * m
         self.p = p = self.overburden + model.surface_stress
@@ -198,7 +198,7 @@ class State:
         """Matrix (n+1, n+1) that takes g to theta less its surface value."""
         return self.problem.grid.integral * self.fraction[1] if self.problem.pins else self.problem.accumulate
 
-    def _moved(self, d: Array) -> tuple[Array, Array]:
+    def _move(self, d: Array) -> tuple[Array, Array]:
         """m and dm/dr at the nodes where the pinned breaks are moved by ``d`` (k,)."""
         problem = self.problem
         shape, slope = problem.shapes

@@ -65,7 +65,7 @@ def _rule(beta: float) -> Array:
     return np.stack([*_GAUSS, _GAUSS[1] if beta == 0.0 else product])
 
 
-def _graded(breaks: Array) -> Array:
+def _grade(breaks: Array) -> Array:
     """``breaks`` and more of them towards the surface, where P dz has an integrable singularity if T has no limit."""
     return np.concatenate([breaks[:1], breaks[1] * _GRADED, breaks[1:]])
 
@@ -95,7 +95,7 @@ class Elements:
             s, rough[:, 0] / _CHANGE, rough[:, 1], 1.0 / (_CHANGE_OF_FLUX * model.flux_scale), _LONGEST
         )
         if model.unlimited:
-            breaks = _graded(breaks)
+            breaks = _grade(breaks)
         nodal = np.ascontiguousarray(values(kernel.places(breaks, _GAUSS[0])))
         return cls._through(model, stretch, log_mass, breaks, nodal)
 
@@ -159,11 +159,11 @@ class Elements:
         kernel.evaluate(self.breaks, self.ends, self.slopes, _CARDINAL, s, out)
         return out
 
-    def adapted(self, stretch: float) -> Elements:
+    def adapt(self, stretch: float) -> Elements:
         """The same flow on new elements, with another stretch."""
-        return self.blended(self, 0.0, stretch)
+        return self.blend(self, 0.0, stretch)
 
-    def blended(self, other: Elements, fraction: float, stretch: float) -> Elements:
+    def blend(self, other: Elements, fraction: float, stretch: float) -> Elements:
         """``fraction`` of the way to another flow, also beyond it, on elements that suit this one."""
         breaks, ends, slopes = kernel.blend(
             self.breaks, self.ends, self.slopes, self.stretch, other.breaks, other.ends, other.slopes, other.stretch,
@@ -172,7 +172,7 @@ class Elements:
         )  # fmt: skip
         log_mass = self.log_mass + fraction * (other.log_mass - self.log_mass)
         found = Elements(self.model, stretch, breaks, ends, slopes, log_mass)
-        return found.on(_graded(breaks)) if self.model.unlimited else found
+        return found.on(_grade(breaks)) if self.model.unlimited else found
 
     @property
     def _rule(self) -> Array:
@@ -193,12 +193,12 @@ class Elements:
         values = self.at(kernel.places(breaks, _GAUSS[0]))
         return Elements._through(self.model, self.stretch, self.log_mass, breaks, values)
 
-    def halved(self) -> Elements:
+    def halve(self) -> Elements:
         """The same polynomials on elements of half the length."""
         breaks, ends, slopes = kernel.halve(self.breaks, self.ends, self.slopes, _GAUSS[0], _CARDINAL, _DIFFERENCES)
         return Elements(self.model, self.stretch, breaks, ends, slopes, self.log_mass)
 
-    def iterated(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
+    def iterate(self, weights: Array, value: float, tolerance: float, most: int, *, rounding: bool = False) -> Iterate:
         """Newton's method for the flow whose macroscopic quantities, times ``weights`` (4,), sum to ``value``: until a
         step is below ``tolerance``, or ``most`` steps; with what ``rounding`` may do where that is requested."""
         ends, slopes = self.ends.copy(), self.slopes.copy()

@@ -69,7 +69,7 @@ class Profile(Result):
 
     def __repr__(self) -> str:
         heights = np.ravel(self.height)
-        return display.line("Profile", display.counted(heights.size, "height"), display.span("z", heights))
+        return display.line("Profile", display.count_of(heights.size, "height"), display.span("z", heights))
 
     def _repr_html_(self) -> str:
         columns = [np.ravel(getattr(self, name)) for name in FIELDS]
@@ -122,7 +122,7 @@ class Flow(Result):
         kinds = f"density {self.density}, interior {self.interior}; {self.validity.summary}"
         return display.html_table(f"Flow: {self.name}", ("", "", ""), rows, kinds)
 
-    def _compared(self) -> tuple[object, ...]:
+    def _comparison_key(self) -> tuple[object, ...]:
         solution = self.solution
         return self.chute, solution.macroscopic, solution.error, solution.status.name
 
@@ -406,9 +406,9 @@ class Flow(Result):
     def _share_of_largest(self) -> Array:
         """Fraction of the overburden at the largest nu: where p dtheta/dp = 1, or at an end."""
         # Where grains are packed almost densest, samples alone do not tell.
-        return max(self._largest_sampled(), np.ones(1), key=lambda share: self._log_density(float(share[0])))
+        return max(self._locate_largest(), np.ones(1), key=lambda share: self._log_density(float(share[0])))
 
-    def _largest_sampled(self) -> Array:
+    def _locate_largest(self) -> Array:
         """Where nu is largest beside the largest of the samples."""
         share, nu = self._samples["share"], self._samples["nu"]
         k = int(np.argmax(nu))
@@ -482,13 +482,13 @@ class Flow(Result):
         height and those with respect to parameters are asked for at the same ones."""
         kept: tuple[Array, Array] | None = self.__dict__.get("_last_shares")
         if kept is None or not np.array_equal(kept[0], z):
-            kept = z.copy(), self._found_shares(z)
+            kept = z.copy(), self._find_shares(z)
             kept[1].setflags(write=False)
             self.__dict__["_last_shares"] = kept
         return kept[1]
 
     @_vanishing
-    def _found_shares(self, z: Array) -> Array:
+    def _find_shares(self, z: Array) -> Array:
         """Fractions of the overburden at heights z: Newton's method in ln p, along which dz = -(p/nu) d ln p."""
         state, p_s = self._state, self._model.surface_stress
         samples = self._samples["share"].copy()

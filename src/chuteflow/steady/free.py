@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY
 from chuteflow.steady.chute import Chute
 from chuteflow.theory.bases import base
 from chuteflow.theory.constitutive import Law
-from chuteflow.theory.laws import law, settings_added
+from chuteflow.theory.laws import add_settings, law
 
 #: Where a parameter may lie, and between which values it is searched for, by the last part of its name.
 _RANGES = {
@@ -56,7 +56,7 @@ class FreeParameter:
 
     @property
     def model_name(self) -> str:
-        """What :func:`chuteflow.steady.model.stepped_model` calls it."""
+        """What :func:`chuteflow.steady.model.step_model` calls it."""
         return BY_KEY[self.key].name if self.key in BY_KEY else self.key
 
     @property
@@ -90,20 +90,20 @@ class FreeParameter:
         where, _, name = self.key.partition(".")
         if where == "base":
             return {"base": replace(base(chute.base), **{name: value})}
-        return {"closure": _configured(chute.law, name, float(value))}
+        return {"closure": _configure(chute.law, name, float(value))}
 
 
-def _configured(chosen: Law, name: str, value: float) -> Law:
+def _configure(chosen: Law, name: str, value: float) -> Law:
     """A law with another value of one parameter, each said once in the text by which it is requested."""
     text = str(chosen)
     try:
         known = law(text) == chosen
     except InputError:
         known = False
-    return law(settings_added(text, (f"{name}={value!r}",))) if known else chosen.configured(**{name: value})
+    return law(add_settings(text, (f"{name}={value!r}",))) if known else chosen.configured(**{name: value})
 
 
-def varied(chute: Chute, free: Sequence[FreeParameter], values: Sequence[float]) -> Chute:
+def vary(chute: Chute, free: Sequence[FreeParameter], values: Sequence[float]) -> Chute:
     """``chute`` with other ``values`` of some of its parameters.
 
     Raises:
@@ -139,11 +139,11 @@ def free_parameter(chute: Chute, asked: str) -> FreeParameter:
     if len(found) == 1:
         return known[found[0]]
     if found:
-        raise InputError(f"parameter {shown(asked)}: it is {' or '.join(found)}; say which")
-    raise InputError(f"unknown parameter {shown(asked)}: choose from {', '.join(known)}")
+        raise InputError(f"parameter {shorten(asked)}: it is {' or '.join(found)}; say which")
+    raise InputError(f"unknown parameter {shorten(asked)}: choose from {', '.join(known)}")
 
 
-def chosen_parameters(
+def choose_parameters(
     chute: Chute, free: Sequence[str], ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[FreeParameter, ...]:
     """The parameters of ``chute`` called ``free``, to be searched for in the ``ranges`` that are given by name.

@@ -273,11 +273,11 @@ def model(chute: Chute) -> Model:
     Raises:
         InputError: where that law has no meaning for the chute.
     """
-    return _registered(chute, chute.law)
+    return _model_of(chute, chute.law)
 
 
 @lru_cache(maxsize=64)
-def _registered(chute: Chute, chosen: Law) -> Model:
+def _model_of(chute: Chute, chosen: Law) -> Model:
     # The chute may be older than the law.
     require_positive(chosen, chute.restitution, chute.slope)
     if chute.surface == "free":
@@ -301,7 +301,7 @@ def model_along(chute: Chute, parameter: str, value: float) -> tuple[Model, Mode
     return _model(chute, chosen, at, table, on), _model(chute, chosen, beyond, table_beyond, on)
 
 
-def stepped_model(chute: Chute, parameter: str) -> Model:
+def step_model(chute: Chute, parameter: str) -> Model:
     """The continuous problem of ``chute`` an imaginary step of one parameter further, see :func:`model_along`.
 
     ``parameter`` is one of PARAMETERS, or ``closure.NAME`` or ``base.NAME`` for a parameter of the law or the base.

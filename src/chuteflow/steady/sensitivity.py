@@ -34,7 +34,7 @@ from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T, stretch_pos
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, all_free, free_parameter
 from chuteflow.steady.linearised import rates_along_branch, solve_bordered
-from chuteflow.steady.model import Model, stepped_model
+from chuteflow.steady.model import Model, step_model
 from chuteflow.steady.quantities import FIELDS, NUMBERS
 from chuteflow.steady.solver import Solution
 from chuteflow.threads import on_one_thread
@@ -229,7 +229,7 @@ class Sensitivity:
         """Derivatives (k,) of every number of the registry at the fixed quantity; infinite at its fold, NaN for the
         height of an interface that is not there."""
         along, across = self.numbers_along
-        found = {name: self._combined(along[name], across[name]) for name in NUMBERS}
+        found = {name: self._combine(along[name], across[name]) for name in NUMBERS}
         return found | {CONDITIONS[self.at].quantity: np.zeros(len(self.parameters))}
 
     @cached_property
@@ -272,7 +272,7 @@ class Sensitivity:
         along, across = self.profile_along(z, coordinate)
         count = len(self.parameters)
         return {
-            name: np.stack([self._combined(along[name], across[name][j], j) for j in range(count)])
+            name: np.stack([self._combine(along[name], across[name][j], j) for j in range(count)])
             if count
             else np.empty((0, len(along[name])))
             for name in FIELDS
@@ -319,7 +319,7 @@ class Sensitivity:
             key: by_parameter / length
         }
 
-    def _combined(self, along: Any, across: Any, j: int | slice = slice(None)) -> Array:
+    def _combine(self, along: Any, across: Any, j: int | slice = slice(None)) -> Array:
         """Derivatives at the fixed quantity of what changes ``along`` the branch and ``across`` it."""
         c = WHICH[self.at]
         if self.at_fold:
@@ -363,7 +363,7 @@ def sensitivity(flow: Flow, parameters: Sequence[str | FreeParameter] | None = N
     problem, z, state = flow.solution.problem, flow.solution.z, flow.solution.state
     gradient = state.macroscopic_gradient()
     weights = _transversal(flow, gradient)
-    beyond = [stepped_model(chute, parameter.model_name) for parameter in free]
+    beyond = [step_model(chute, parameter.model_name) for parameter in free]
     states = [replace(problem, model=one).state(z) for one in beyond]
     sides = np.zeros((len(z), 1 + len(free)))
     sides[-1, 0] = 1.0

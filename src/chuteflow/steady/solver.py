@@ -118,7 +118,7 @@ class Solution:
         return self.problem.state(self.z)
 
 
-def checked_tolerance(tolerance: float) -> float:
+def check_tolerance(tolerance: float) -> float:
     """The relative tolerance, checked to be in the range allowed.
 
     Raises:
@@ -153,7 +153,7 @@ def collocate(solution: Solution) -> tuple[Collocation, Array]:
     found, agrees = _on_grids(solution, weights, value)
     if not agrees and solution.error > TOLERANCE:
         # A flow that was requested roughly: between the ends of its elements it has fewer digits than its integrals.
-        finer = solve(solution.elements.halved(), Condition(tuple(weights.tolist()), value), TOLERANCE)
+        finer = solve(solution.elements.halve(), Condition(tuple(weights.tolist()), value), TOLERANCE)
         if finer.converged:
             found, _ = _on_grids(finer, weights, value)
     return found
@@ -192,7 +192,7 @@ def _on_finer_elements(elements: Elements, problem: Collocation, weights: Array,
     """The unknowns of a flow on the grid of ``problem``, from elements halved until they settle; whether they do."""
     z = elements.unknowns(problem)
     for _ in range(_MOST_HALVINGS):
-        finer = _iterated(elements.halved(), weights, value, _FINE_STEP)
+        finer = _iterate(elements.halve(), weights, value, _FINE_STEP)
         if not np.isfinite(finer.step):
             break
         elements, before = finer.flow, z
@@ -221,9 +221,9 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     very close to a fold.
     """
     weights, value = np.array(condition.weights), condition.value
-    coarse = _iterated(start, weights, value, _STEP)
+    coarse = _iterate(start, weights, value, _STEP)
     while np.isfinite(coarse.step):
-        fine = _iterated(coarse.flow.halved(), weights, value, _FINE_STEP, rounding=True)
+        fine = _iterate(coarse.flow.halve(), weights, value, _FINE_STEP, rounding=True)
         if not np.isfinite(fine.step):
             break
         change = float(np.abs(fine.quantities - coarse.quantities).max())
@@ -236,14 +236,14 @@ def solve(start: Elements, condition: Condition, tolerance: float = TOLERANCE) -
     return Solution(np.full(4, np.nan), np.inf, SolverStatus.NO_CONVERGENCE, start)
 
 
-def _iterated(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:
+def _iterate(start: Elements, weights: Array, value: float, step: float, *, rounding: bool = False) -> Iterate:
     """Newton's method until a step is below ``step``, on elements that end where the flow passes a break of the law."""
     if not start.model.kinks.size:
-        return start.iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+        return start.iterate(weights, value, step, _MOST_STEPS, rounding=rounding)
     places = kinks.crossings(start)
     distance, found = np.inf, None
     for _ in range(_MOST_ROUNDS):
-        found = kinks.with_ends(start, places).iterated(weights, value, step, _MOST_STEPS, rounding=rounding)
+        found = kinks.with_ends(start, places).iterate(weights, value, step, _MOST_STEPS, rounding=rounding)
         if not np.isfinite(found.step):
             break
         start, places = found.flow, kinks.crossings(found.flow)
@@ -259,13 +259,13 @@ def resolve(
     near: Solution, condition: Condition, tolerance: float = TOLERANCE, problem: Model | None = None
 ) -> Solution:
     """The flow that meets ``condition``, from a neighbour, which may be of another ``problem``."""
-    start = near.elements.adapted(_stretch(near))
+    start = near.elements.adapt(_stretch(near))
     return solve(start if problem is None else replace(start, model=problem), condition, tolerance)
 
 
 def between(one: Solution, other: Solution, fraction: float) -> Elements:
     """Where to start from for a flow ``fraction`` of the way from ``one`` to ``other``."""
-    return one.elements.blended(other.elements, fraction, _stretch(one))
+    return one.elements.blend(other.elements, fraction, _stretch(one))
 
 
 def _stretch(solution: Solution) -> float:

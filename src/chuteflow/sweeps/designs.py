@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.checks import MOST_SHOWN, number, number_in, shown
+from chuteflow.checks import MOST_SHOWN, number, number_in, shorten
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.sobol import Sobol
@@ -27,14 +27,14 @@ _LARGEST_SEED = (1 << 64) - 1
 _SCALES = ("linear", "log")
 
 
-def shown_key(name: str) -> str:
+def show_key(name: str) -> str:
     """The name of a key for a message: as it is, or quoted where it is long or cannot be printed."""
-    return name if name.isprintable() and len(name) <= MOST_SHOWN else shown(name)
+    return name if name.isprintable() and len(name) <= MOST_SHOWN else shorten(name)
 
 
-def shown_path(path: str | os.PathLike[str]) -> str:
+def show_path(path: str | os.PathLike[str]) -> str:
     """A path for a message: as it is, or quoted where it cannot be printed."""
-    return str(path) if str(path).isprintable() else shown(str(path))
+    return str(path) if str(path).isprintable() else shorten(str(path))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +116,12 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
     key = f"parameters.{name}"
     if name in words:
         known = words[name][0]
-        names = _listed(value)
+        names = _as_list(value)
         for one in names:
             if isinstance(one, str) and one in known:
                 continue
             if name not in OPEN or not isinstance(one, str):
-                raise InputError(f"{key}: unknown {name} {shown(one)}: choose one of {', '.join(known)}")
+                raise InputError(f"{key}: unknown {name} {shorten(one)}: choose one of {', '.join(known)}")
             known = (*known, one)
         if not names:
             raise InputError(f"{key} = []: give at least one value")
@@ -130,13 +130,13 @@ def axis_from(name: str, value: Any, words: Mapping[str, tuple[tuple[str, ...], 
         return _range(name, key, value)
     if isinstance(value, np.ndarray) and value.dtype == float and np.isfinite(value).all():
         return DesignAxis(name, value)
-    values = _listed(value)
+    values = _as_list(value)
     if not values:
         raise InputError(f"{key} = []: give at least one value")
     return DesignAxis(name, np.array([number(key, one) for one in values]))
 
 
-def _listed(value: Any) -> list[Any]:
+def _as_list(value: Any) -> list[Any]:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value if isinstance(value, list) else [value]
@@ -145,21 +145,21 @@ def _listed(value: Any) -> list[Any]:
 def _range(name: str, key: str, value: Mapping[str, Any]) -> DesignAxis:
     for one in value:
         if one not in ("from", "to", "points", "scale"):
-            raise InputError(f"unknown key {key}.{shown_key(one)}: a range has from, to, points and scale")
+            raise InputError(f"unknown key {key}.{show_key(one)}: a range has from, to, points and scale")
     for one in ("from", "to"):
         if one not in value:
             raise InputError(f"{key}.{one} is missing: a range has from and to")
     low, high = number(f"{key}.from", value["from"]), number(f"{key}.to", value["to"])
     scale = value.get("scale", "linear")
     if scale not in _SCALES:
-        raise InputError(f"{key}.scale = {shown(scale)}: choose one of {', '.join(_SCALES)}")
+        raise InputError(f"{key}.scale = {shorten(scale)}: choose one of {', '.join(_SCALES)}")
     if not low < high:
         raise InputError(f"{key} from {low:g} to {high:g}: must rise")
     if scale == "log" and low <= 0.0:
         raise InputError(f"{key}.from = {low:g}: must be above 0 on the log scale")
     count = value.get("points", 0)
     if isinstance(count, bool) or not isinstance(count, int) or (count != 0 and not 2 <= count <= MOST_POINTS):
-        raise InputError(f"{key}.points = {shown(count)}: must be a whole number from 2 to {MOST_POINTS}")
+        raise InputError(f"{key}.points = {shorten(count)}: must be a whole number from 2 to {MOST_POINTS}")
     return DesignAxis(name, np.empty(0), (), low, high, scale == "log", True, count)
 
 
@@ -260,12 +260,12 @@ def list_design(
         for name, column in _csv(folder / str(head["file"]), words).items():
             if name in table:
                 raise InputError(
-                    f"parameters.{shown_key(name)} is given in the study and in {head['file']}: give it once"
+                    f"parameters.{show_key(name)} is given in the study and in {head['file']}: give it once"
                 )
             table[name] = column
     for name, value in table.items():
         if isinstance(value, Mapping):
-            raise InputError(f"parameters.{shown_key(name)}: a list design takes values, not a range")
+            raise InputError(f"parameters.{show_key(name)}: a list design takes values, not a range")
     axes = {name: axis_from(name, value, words) for name, value in table.items()}
     lengths = {len(axis.values) for axis in axes.values()} - {1}
     if len(lengths) > 1:
@@ -284,20 +284,20 @@ def _csv(path: Path, words: Mapping[str, Any]) -> dict[str, Any]:
         raise
     except (OSError, ValueError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
-        raise InputError(f"design.file: cannot read {shown_path(path)}: {why}") from None
+        raise InputError(f"design.file: cannot read {show_path(path)}: {why}") from None
 
 
 def _columns(path: Path, lines: Iterator[list[str]], words: Mapping[str, Any]) -> dict[str, Any]:
     names = [name.strip() for name in next((line for line in lines if line), [])]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"design.file: {path} has the column {shown(name)} more than once: keep one of them")
+            raise InputError(f"design.file: {path} has the column {shorten(name)} more than once: keep one of them")
     columns: dict[str, Any] = {name: [] if name in words else array("d") for name in names}
     for i, line in enumerate((line for line in lines if line), 2):
         if len(line) != len(names):
             raise InputError(f"design.file: line {i} of {path} has {len(line)} columns: the first has {len(names)}")
         for name, text in zip(names, line, strict=True):
-            columns[name].append(text.strip() if name in words else number_in(f"{path.name}, {shown_key(name)}", text))
+            columns[name].append(text.strip() if name in words else number_in(f"{path.name}, {show_key(name)}", text))
     if not names or not columns[names[0]]:
         raise InputError(f"design.file: {path} needs a line of names and at least one of numbers")
     return {name: column if isinstance(column, list) else np.array(column) for name, column in columns.items()}
@@ -314,6 +314,6 @@ def _seed(head: Mapping[str, Any]) -> int:
 def _whole(head: Mapping[str, Any], name: str, low: int, high: int, default: int | None) -> int:
     value = head.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        given = "is missing" if value is None else f"= {shown(value)}"
+        given = "is missing" if value is None else f"= {shorten(value)}"
         raise InputError(f"design.{name} {given}: must be a whole number from {low} to {high}")
     return value

@@ -242,7 +242,7 @@ def _fill_singly(study: Study, out: Chunk, point: int, failures: dict[int, str])
     base = study.bases[int(p["base"][point]) if "base" in p else 0]
     which, value = _WHICH[study.condition], float(p[study.condition][point])
     # Of this chute nothing else is asked.
-    within = SearchRange.checked(study.surface_temperature, study.largest_holdup, surface).restricted(which, value)
+    within = SearchRange.checked(study.surface_temperature, study.largest_holdup, surface).restrict(which, value)
     try:
         chute = Chute(slope, e, ew, roughness, surface, closure, base)
         found = solve_within(chute, which, value, study.tolerance, within)

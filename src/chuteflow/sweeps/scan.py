@@ -49,10 +49,10 @@ class Scan(Result):
     failures: Mapping[int, str]
 
     def __repr__(self) -> str:
-        points = display.counted(self.count.size, "point")
+        points = display.count_of(self.count.size, "point")
         reach = [display.span(name, values) for name, values in self.axes.items()]
         failed = f"{len(self.failures)} failed" if self.failures else None
-        return display.line("Scan", points, *reach, display.counted(int(self.count.sum()), "flow"), failed)
+        return display.line("Scan", points, *reach, display.count_of(int(self.count.sum()), "flow"), failed)
 
     def _repr_html_(self) -> str:
         numbers, points = np.unique(self.count, return_counts=True)
@@ -115,7 +115,7 @@ def scan(
     Raises:
         InputError: for a parameter that is missing, unknown or out of range, or too many points.
     """
-    given = _given(chute, parameters)
+    given = _collect_parameters(chute, parameters)
     axes = {name: values for name, values in given.items() if isinstance(values, np.ndarray)}
     points = int(np.prod([len(values) for values in axes.values()]))
     if not 1 <= points <= MOST_POINTS:
@@ -149,7 +149,7 @@ def scan(
     )
 
 
-def _given(chute: Chute | None, parameters: Mapping[str, ArrayLike]) -> dict[str, Any]:
+def _collect_parameters(chute: Chute | None, parameters: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """All parameters by their keys in a study, those that were given first and in their order."""
     found: dict[str, Any] = {}
     for name, value in parameters.items():

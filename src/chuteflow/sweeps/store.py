@@ -38,7 +38,7 @@ from chuteflow.errors import ChuteflowError, InputError
 from chuteflow.extras import require
 from chuteflow.parameters import BY_KEY, CONDITIONS
 from chuteflow.steady.quantities import NUMBERS
-from chuteflow.sweeps.designs import shown_path
+from chuteflow.sweeps.designs import show_path
 from chuteflow.sweeps.numbers import KINDS
 from chuteflow.sweeps.outcome import PointStatus, Reason, meanings
 from chuteflow.sweeps.stability import STABILITY_NUMBERS
@@ -213,7 +213,7 @@ class Store:
                 # Another process may have been first.
                 if not (target / _OWN).is_dir():
                     why = getattr(error, "strerror", None) or error
-                    raise InputError(f"cannot make the store {shown_path(path)}: {why}") from None
+                    raise InputError(f"cannot make the store {show_path(path)}: {why}") from None
         try:
             store = cls.opened(target)
             if store.study.digest == study.digest:
@@ -239,7 +239,7 @@ class Store:
         """
         own = Path(path) / _OWN
         if not own.is_dir():
-            raise InputError(f"{shown_path(path)} is no store of a study: take a path that does not exist yet")
+            raise InputError(f"{show_path(path)} is no store of a study: take a path that does not exist yet")
         try:
             text = (own / "study.json").read_text(encoding="utf-8")
             return cls(Path(path), _study(text, own / _COLUMNS, _folder(own)))
@@ -325,7 +325,7 @@ class Store:
         arrays: dict[str, NDArray[Any]] = {}
         name = "the store"
         try:
-            group = self._opened(self.path)
+            group = self._open(self.path)
             for name in names:
                 arrays[name] = np.asarray(group[name][first:last])
         except _DAMAGE:
@@ -336,9 +336,9 @@ class Store:
         if not (same and counts and (arrays["status"] != PointStatus.NOT_COMPUTED).all()):
             raise DamageError("its arrays are not those of its marker and of the study")
 
-    def damaged_metadata(self) -> list[str]:
+    def find_damaged_metadata(self) -> list[str]:
         """Names of the arrays whose metadata are missing or damaged; "" for those of the whole store."""
-        expected = self._expected(self._versions())
+        expected = self._describe_expected(self._versions())
         names = [name for name, content in expected.items() if _essence(_json(self.path / name)) != _essence(content)]
         return sorted(name.removesuffix("zarr.json").rstrip("/") for name in names)
 
@@ -350,7 +350,7 @@ class Store:
         Raises:
             OSError: where that is impossible.
         """
-        expected = self._expected(dict.fromkeys((*self._versions(), *versions)))
+        expected = self._describe_expected(dict.fromkeys((*self._versions(), *versions)))
         for name, content in expected.items():
             if _json(self.path / name) != json.loads(content):
                 _put(self.path / name, content)
@@ -364,7 +364,7 @@ class Store:
         partial = self._own / _PARTIAL / f"{chunk}-{secrets.token_hex(6)}"
         _make_folder(partial)
         try:
-            contents = self._encoded(chunk, arrays)
+            contents = self._encode(chunk, arrays)
             marker = replace(marker, version=__version__, sums={n: zlib.crc32(c) for n, c in contents.items()})
             for name, content in contents.items():
                 _write(partial / name, content)
@@ -377,15 +377,15 @@ class Store:
             shutil.rmtree(partial, ignore_errors=True)
         return marker
 
-    def _encoded(self, chunk: int, arrays: Mapping[str, NDArray[Any]]) -> dict[str, bytes]:
+    def _encode(self, chunk: int, arrays: Mapping[str, NDArray[Any]]) -> dict[str, bytes]:
         """The files of a chunk, as Zarr writes them."""
         _require_zarr()
         from zarr.storage import MemoryStore
 
         first, last = self.study.extent(chunk)
         # Into memory, so that a chunk gets to the disk whole or not at all.
-        memory = _buffers(_laid_out(self.study, checksums=self._has_checksums(), versions=()))
-        group = self._opened(MemoryStore(memory))
+        memory = _buffers(_lay_out_metadata(self.study, checksums=self._has_checksums(), versions=()))
+        group = self._open(MemoryStore(memory))
         out = {}
         for name in _variables(self.study):
             # What is all fill value is written too: a file that is missing is damage.
@@ -394,7 +394,7 @@ class Store:
         return out
 
     @staticmethod
-    def _opened(place: Any) -> Any:
+    def _open(place: Any) -> Any:
         _require_zarr()
         import zarr
 
@@ -425,8 +425,8 @@ class Store:
             with suppress(DamageError):
                 yield self.marker(chunk).version
 
-    def _expected(self, versions: Iterable[str]) -> dict[str, bytes]:
-        return _laid_out(self.study, checksums=self._has_checksums(), versions=tuple(versions))
+    def _describe_expected(self, versions: Iterable[str]) -> dict[str, bytes]:
+        return _lay_out_metadata(self.study, checksums=self._has_checksums(), versions=tuple(versions))
 
     # Clients
 
@@ -578,7 +578,7 @@ def _lay_out(path: Path, study: Study) -> None:
     """Make the folders and the metadata of a store without a chunk."""
     (path / _OWN / _DONE).mkdir(parents=True)
     Store(path, study).write_study()
-    for name, content in _laid_out(study, checksums=True, versions=(__version__,)).items():
+    for name, content in _lay_out_metadata(study, checksums=True, versions=(__version__,)).items():
         _put(path / name, content)
 
 
@@ -587,7 +587,7 @@ def _require_zarr() -> None:
 
 
 @lru_cache(maxsize=4)
-def _laid_out(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
+def _lay_out_metadata(study: Study, *, checksums: bool, versions: tuple[str, ...]) -> dict[str, bytes]:
     """The metadata of a store by their place in it, as Zarr writes them."""
     _require_zarr()
     import zarr

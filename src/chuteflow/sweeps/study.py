@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chuteflow.branches.ranges import SearchRange
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.parameters import BY_KEY, CONDITIONS, DEEPEST, LARGEST_HOLDUP, SHALLOWEST, SURFACE_TEMPERATURE
 from chuteflow.steady.chute import SURFACES
@@ -28,8 +28,8 @@ from chuteflow.sweeps.designs import (
     StudyDesign,
     axis_from,
     list_design,
-    shown_key,
-    shown_path,
+    show_key,
+    show_path,
 )
 from chuteflow.sweeps.stability import STABILITY_CHUNK, STABILITY_KINDS, STABILITY_NUMBERS, needs_stability
 from chuteflow.theory.bases import BASES, BaseCondition, base
@@ -124,7 +124,7 @@ def read(path: str | os.PathLike[str]) -> Study:
         text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot read the study {shown_path(path)}: {why}") from None
+        raise InputError(f"cannot read the study {show_path(path)}: {why}") from None
     if len(content) > _MOST_BYTES:
         raise InputError(f"the study {path} has more than {_MOST_BYTES} bytes: give long lists as design.file")
     try:
@@ -148,7 +148,7 @@ def from_canonical(text: str, column: Callable[[str], Column] | None = None, fol
     except (ValueError, RecursionError):
         raise InputError("the study is damaged: it is not JSON") from None
     if not isinstance(given, dict):
-        raise InputError(f"the study is damaged: it is {shown(given)}")
+        raise InputError(f"the study is damaged: it is {shorten(given)}")
     parameters = dict(_table(given, "parameters"))
     for name, value in parameters.items():
         if column is not None and isinstance(value, Mapping) and "sha256" in value:
@@ -174,7 +174,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     head, search, results = (_table(given, name) for name in ("design", "search", "results"))
     kind = head.get("kind", "product")
     if kind not in (*DESIGNS, "list"):
-        raise InputError(f"design.kind = {shown(kind)}: choose one of {', '.join((*DESIGNS, 'list'))}")
+        raise InputError(f"design.kind = {shorten(kind)}: choose one of {', '.join((*DESIGNS, 'list'))}")
     parameters = _table(given, "parameters")
     if kind == "list":
         _only(head, "design.", ("kind", "file"))
@@ -184,7 +184,7 @@ def from_dict(given: Mapping[str, Any], folder: Path) -> Study:
     else:
         _only(head, "design.", ("kind", *DESIGNS[kind].settings))
         axes = {name: axis_from(name, value, WORDS) for name, value in parameters.items()}
-    condition = _checked_names(axes)
+    condition = _check_names(axes)
     for name, (_, default) in WORDS.items():
         if name not in axes and name not in _OPTIONAL:
             axes[name] = axis_from(name, default, WORDS)
@@ -294,7 +294,7 @@ def _title(given: Mapping[str, Any]) -> str:
     try:
         return str(given.get("title", ""))
     except (ValueError, RecursionError):
-        raise InputError(f"title = {shown(given['title'])}: must be a text") from None
+        raise InputError(f"title = {shorten(given['title'])}: must be a text") from None
 
 
 def _plain(value: Any) -> Any:
@@ -309,12 +309,12 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, str) else float(value)
 
 
-def _checked_names(axes: Mapping[str, DesignAxis]) -> str:
+def _check_names(axes: Mapping[str, DesignAxis]) -> str:
     """The condition among the parameters, once it is sure that they are complete."""
     known = (*RANGES, *WORDS)
     for name in axes:
         if name not in known:
-            raise InputError(f"unknown parameter {shown(name)}: choose from {', '.join(known)}")
+            raise InputError(f"unknown parameter {shorten(name)}: choose from {', '.join(known)}")
     missing = [name for name in BY_KEY if name not in axes]
     if missing:
         raise InputError(f"parameters.{missing[0]} is missing: the study needs {', '.join(BY_KEY)} and a condition")
@@ -337,24 +337,24 @@ def _check_range(axis: DesignAxis) -> None:
 def _quantities(names: Any) -> tuple[str, ...]:
     known = (*NUMBERS, *KINDS, *STABILITY_NUMBERS)
     if not isinstance(names, list) or not names:
-        raise InputError(f"results.quantities = {shown(names)}: must be a list of names, from {', '.join(known)}")
+        raise InputError(f"results.quantities = {shorten(names)}: must be a list of names, from {', '.join(known)}")
     for name in names:
         if name not in known:
-            raise InputError(f"results.quantities: unknown quantity {shown(name)}: choose from {', '.join(known)}")
+            raise InputError(f"results.quantities: unknown quantity {shorten(name)}: choose from {', '.join(known)}")
     return tuple(dict.fromkeys(names))
 
 
 def _table(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     table = given.get(name, {})
     if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {shown(table)}: must be a table, [{name}]")
+        raise InputError(f"{name} = {shorten(table)}: must be a table, [{name}]")
     return table
 
 
 def _only(table: Mapping[str, Any], where: str, known: tuple[str, ...]) -> None:
     for name in table:
         if name not in known:
-            raise InputError(f"unknown key {where}{shown_key(name)}: choose from {', '.join(known)}")
+            raise InputError(f"unknown key {where}{show_key(name)}: choose from {', '.join(known)}")
 
 
 def _number(
@@ -364,7 +364,7 @@ def _number(
     kinds = int if whole else (int, float)
     if isinstance(value, bool) or not isinstance(value, kinds) or not low <= value <= high:
         what = "a whole number" if whole else "a number"
-        raise InputError(f"{key} = {shown(value)}: must be {what} from {low:g} to {high:g}")
+        raise InputError(f"{key} = {shorten(value)}: must be {what} from {low:g} to {high:g}")
     return value if whole else float(value)
 
 
@@ -375,5 +375,5 @@ def _interval(value: Any) -> tuple[float, float]:
     except (ValueError, OverflowError):
         low = high = math.nan
     if not math.isfinite(low + high):
-        raise InputError(f"search.surface_temperature = {shown(value)}: must be two numbers, [low, high]")
+        raise InputError(f"search.surface_temperature = {shorten(value)}: must be two numbers, [low, high]")
     return low, high

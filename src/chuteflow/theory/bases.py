@@ -15,7 +15,7 @@ from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shorten
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
 from chuteflow.parameters import PARAMETERS
@@ -54,7 +54,7 @@ class BaseCondition:
     def exchange(self, at: AtBase, roughness: float, wall_restitution: float) -> tuple[Vector, Number]:
         """The momentum M that the base takes from moving grains, and the energy lost in collisions with it."""
 
-    def checked_roughness(self, value: Any) -> float:
+    def check_roughness(self, value: Any) -> float:
         """The roughness, checked to be in the range of the condition.
 
         Raises:
@@ -123,14 +123,14 @@ class Richman(BaseCondition):
         """(2.9)-(2.15)."""
         return richman_exchange(at, roughness, wall_restitution, self.diameter)
 
-    def checked_roughness(self, value: Any) -> float:
+    def check_roughness(self, value: Any) -> float:
         """From hemispheres that touch, to those between which a grain touches the plane.
 
         Raises:
             InputError: for one out of range.
         """
         if self.diameter == 1.0:
-            return super().checked_roughness(value)
+            return super().check_roughness(value)
         found = number("roughness", value)
         low = self.diameter / (1.0 + self.diameter)
         high = math.sqrt(1.0 - 1.0 / (1.0 + self.diameter) ** 2)
@@ -207,7 +207,7 @@ def base(asked: str | BaseCondition) -> BaseCondition:
         return asked
     name, _, said = asked.partition(":") if isinstance(asked, str) else (asked, "", "")
     if not isinstance(name, str) or name not in BASES:
-        raise InputError(f"unknown base {shown(asked)}: choose one of {', '.join(BASES)}")
+        raise InputError(f"unknown base {shorten(asked)}: choose one of {', '.join(BASES)}")
     settings: dict[str, float] = {}
     for part in said.split(",") if said else ():
         key, _, value = part.partition("=")
@@ -217,7 +217,7 @@ def base(asked: str | BaseCondition) -> BaseCondition:
         try:
             settings[key] = float(value)
         except ValueError:
-            raise InputError(f"{key} = {shown(value)}: must be a number") from None
+            raise InputError(f"{key} = {shorten(value)}: must be a number") from None
     return replace(BASES[name], **settings)
 
 

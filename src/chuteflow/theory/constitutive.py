@@ -27,7 +27,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.numerics.complex_step import stepped
 
@@ -381,7 +381,7 @@ def require_positive(law: Law, e: float, slope: float) -> None:
 def _require_positive(law: Law, e: float, slope: float) -> None:
     if not (isinstance(law.densest, (int, float)) and 0.0 < law.densest <= 1.0):
         raise InputError(
-            f"closure {law}: its densest packing is {shown(law.densest)}: must be a number above 0, at most 1"
+            f"closure {law}: its densest packing is {shorten(law.densest)}: must be a number above 0, at most 1"
         )
     nu, _, g = law.at(_TRIED, e, slope)
     if not isinstance(g, Coefficients):

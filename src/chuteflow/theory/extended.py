@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.theory.constitutive import Coefficients, Field, Law
 from chuteflow.theory.formula import Formula, crossings
@@ -45,16 +45,16 @@ class Extended(Formula):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.length not in LENGTHS:
-            raise InputError(f"unknown length {shown(self.length)}: choose one of {', '.join(LENGTHS)}")
+            raise InputError(f"unknown length {shorten(self.length)}: choose one of {', '.join(LENGTHS)}")
 
     def __call__(self, nu: Field, free_fraction: Field, e: float, slope: float) -> Coefficients:
         """The coefficients in a fully developed flow down ``slope``."""
         plain = self._without_length(nu, free_fraction, e)
-        return self._shortened(plain, nu, free_fraction, e, slope * plain.compressibility / plain.viscosity)
+        return self._shorten(plain, nu, free_fraction, e, slope * plain.compressibility / plain.viscosity)
 
     def at_shear(self, nu: Field, free_fraction: Field, e: float, rate: Field) -> Coefficients:
         """The coefficients where the shear rate over nu sqrt(T) is ``rate`` = S/nu, whatever the flow."""
-        return self._shortened(self._without_length(nu, free_fraction, e), nu, free_fraction, e, rate)
+        return self._shorten(self._without_length(nu, free_fraction, e), nu, free_fraction, e, rate)
 
     def breaks(self, e: float, slope: float) -> tuple[float, ...]:
         """Those of the radial function, and where the length becomes 1 or takes another form."""
@@ -106,7 +106,7 @@ class Extended(Formula):
             bulk_viscosity=4.0 / (3.0 * _ROOT_PI) * f * nu * x,
         )
 
-    def _shortened(self, plain: Coefficients, nu: Field, free_fraction: Field, e: float, rate: Field) -> Coefficients:
+    def _shorten(self, plain: Coefficients, nu: Field, free_fraction: Field, e: float, rate: Field) -> Coefficients:
         """``plain`` with its dissipation over max(1, L); ``rate`` is S/nu."""
         if self.length == "none":
             return plain

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from chuteflow.checks import number, shown
+from chuteflow.checks import number, shorten
 from chuteflow.errors import InputError
 from chuteflow.theory.constitutive import CLUSTERED, Coefficients, Field
 from chuteflow.theory.friction import FRICTIONS, effective_restitution
@@ -44,11 +44,11 @@ class Formula:
     def __post_init__(self) -> None:
         if self.packing is not None:
             object.__setattr__(self, "packing", number("packing", self.packing))
-        self._radial.chosen_packing(self.packing)
+        self._radial.choose_packing(self.packing)
         object.__setattr__(self, "friction", number("friction", self.friction, 0.0, _MOST_FRICTION))
         if self.friction_model not in FRICTIONS:
             raise InputError(
-                f"unknown friction model {shown(self.friction_model)}: choose one of {', '.join(FRICTIONS)}"
+                f"unknown friction model {shorten(self.friction_model)}: choose one of {', '.join(FRICTIONS)}"
             )
 
     @abstractmethod
@@ -58,7 +58,7 @@ class Formula:
     @property
     def densest(self) -> float:
         """nu*."""
-        return self._radial.chosen_packing(self.packing)
+        return self._radial.choose_packing(self.packing)
 
     def breaks(self, e: float, slope: float) -> tuple[float, ...]:
         """Volume fractions at which a coefficient is not smooth, ascending."""
@@ -121,14 +121,14 @@ def parsed(formula: object, name: str, text: str) -> float | str | bool | None:
     now = getattr(formula, name)
     if isinstance(now, bool):
         if text.lower() not in ("true", "false", "yes", "no", "1", "0"):
-            raise InputError(f"{name} = {shown(text)}: must be true or false")
+            raise InputError(f"{name} = {shorten(text)}: must be true or false")
         return text.lower() in ("true", "yes", "1")
     if isinstance(now, str):
         return text
     try:
         value = float(text)
     except ValueError:
-        raise InputError(f"{name} = {shown(text)}: must be a number") from None
+        raise InputError(f"{name} = {shorten(text)}: must be a number") from None
     if not math.isfinite(value):
-        raise InputError(f"{name} = {shown(text)}: must be a finite number")
+        raise InputError(f"{name} = {shorten(text)}: must be a finite number")
     return value

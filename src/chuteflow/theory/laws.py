@@ -20,7 +20,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from chuteflow.checks import shown
+from chuteflow.checks import shorten
 from chuteflow.errors import InputError
 from chuteflow.theory.constitutive import Law
 from chuteflow.theory.extended import EXTENDED, JENKINS_BERZI
@@ -46,11 +46,11 @@ def law(asked: str | Law) -> Law:
     if isinstance(asked, Law):
         return asked
     if not isinstance(asked, str):
-        raise InputError(f"unknown closure {shown(asked)}: must be a text or a Law; choose one of {', '.join(LAWS)}")
+        raise InputError(f"unknown closure {shorten(asked)}: must be a text or a Law; choose one of {', '.join(LAWS)}")
     if asked in LAWS:
         return LAWS[asked]
     where, settings = _parts(asked)
-    found = _in_file(where) if _is_in_file(where) else _named(where)
+    found = _in_file(where) if _is_in_file(where) else _find(where)
     if not settings:
         return found
     values = {}
@@ -66,7 +66,7 @@ def closures() -> dict[str, Law]:
     return dict(known_laws())
 
 
-def settings_added(asked: str, settings: tuple[str, ...]) -> str:
+def add_settings(asked: str, settings: tuple[str, ...]) -> str:
     """The text ``asked`` with more ``settings``, each KEY=VALUE.
 
     Raises:
@@ -84,7 +84,7 @@ def in_folder(asked: str, folder: Path) -> str:
     if not _is_in_file(where):
         return asked
     file, _, name = where.rpartition(":")
-    return settings_added(f"{folder / file}:{name}", tuple(f"{key}={value}" for key, value in settings.items()))
+    return add_settings(f"{folder / file}:{name}", tuple(f"{key}={value}" for key, value in settings.items()))
 
 
 def runs_code(asked: str) -> bool:
@@ -99,7 +99,7 @@ def known_laws() -> dict[str, Law]:
     Raises:
         InputError: for an entry point that cannot be loaded, or is no law.
     """
-    return {name: _offered(name, entry) for name, entry in _entry_points().items()} | LAWS
+    return {name: _load_offered(name, entry) for name, entry in _entry_points().items()} | LAWS
 
 
 def _parts(asked: str) -> tuple[str, dict[str, str]]:
@@ -117,17 +117,17 @@ def _settings(text: str) -> dict[str, str]:
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not (equals and name.strip() and value.strip()):
-            raise InputError(f"{shown(part)}: parameters of a closure are given as KEY=VALUE, such as packing=0.64")
+            raise InputError(f"{shorten(part)}: parameters of a closure are given as KEY=VALUE, such as packing=0.64")
         found[name.strip()] = value.strip()
     return found
 
 
-def _named(name: str) -> Law:
+def _find(name: str) -> Law:
     if name in LAWS:
         return LAWS[name]
     entries = _entry_points()
     if name in entries:
-        return _offered(name, entries[name])
+        return _load_offered(name, entries[name])
     known = ", ".join(dict.fromkeys((*LAWS, *entries)))
     raise InputError(f"unknown closure {name!r}: choose one of {known}, or FILE.py:NAME")
 
@@ -140,7 +140,7 @@ def _entry_points() -> dict[str, Any]:
     return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
 
 
-def _offered(name: str, entry: Any) -> Law:
+def _load_offered(name: str, entry: Any) -> Law:
     try:
         found = entry.load()
     except Exception as error:  # noqa: BLE001 - what another package raises is its own

@@ -36,7 +36,7 @@ class Radial:
     fixed: bool = False
     valid: str = ""
 
-    def chosen_packing(self, packing: float | None) -> float:
+    def choose_packing(self, packing: float | None) -> float:
         """The packing that is meant where ``packing`` is given, or None.
 
         Raises:

@@ -42,12 +42,12 @@ def _object(one: Case) -> dict[str, Any]:
     return {
         "name": one.name,
         "description": one.description,
-        "chute": {key: _known(known) for key, known in one.numbers.items()} | dict(one.names),
-        "grains": {key: _known(known) for key, known in one.grains.items()},
+        "chute": {key: _list_known(known) for key, known in one.numbers.items()} | dict(one.names),
+        "grains": {key: _list_known(known) for key, known in one.grains.items()},
     }
 
 
-def _known(known: CaseNumber) -> dict[str, Any]:
+def _list_known(known: CaseNumber) -> dict[str, Any]:
     return {
         "value": known.value,
         "uncertainty": known.uncertainty,

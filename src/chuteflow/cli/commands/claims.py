@@ -41,19 +41,19 @@ def command(only: str | None, section: str | None, listed: bool, as_json: bool, 
     """Choose, compute, and print or write."""
     from chuteflow.paper.claims import CLAIMS, check
 
-    ids = _chosen(only, section)
+    ids = _choose(only, section)
     if out is not None:
         from chuteflow.io.writing import require_writable
 
         as_json = require_writable(out, _WRITTEN) == ".json"
     if listed and as_json:
-        lines: Iterable[str] = [_listed(ids)]
+        lines: Iterable[str] = [_list_as_json(ids)]
     elif listed:
         lines = (f"{id:32}  {CLAIMS[id].source}: {CLAIMS[id].statement}" for id in ids)
     elif as_json:
-        lines = [_json(list(_watched(check(ids), len(ids))))]
+        lines = [_json(list(_watch(check(ids), len(ids))))]
     else:
-        lines = _report(_watched(check(ids), len(ids)), _width() if out is None else _WIDEST)
+        lines = _report(_watch(check(ids), len(ids)), _width() if out is None else _WIDEST)
     if out is None:
         for line in lines:
             click.echo(line)
@@ -61,7 +61,7 @@ def command(only: str | None, section: str | None, listed: bool, as_json: bool, 
         _write(out, "\n".join(lines) + "\n")
 
 
-def _chosen(only: str | None, section: str | None) -> list[str]:
+def _choose(only: str | None, section: str | None) -> list[str]:
     from chuteflow.paper.claims import CLAIMS, matching
 
     ids = list(CLAIMS) if only is None else matching(word.strip() for word in only.split(","))
@@ -75,7 +75,7 @@ def _chosen(only: str | None, section: str | None) -> list[str]:
     return [id for id in ids if wanted.intersection(CLAIMS[id].sections)]
 
 
-def _watched(verdicts: Iterable[ClaimResult], total: int) -> Iterator[ClaimResult]:
+def _watch(verdicts: Iterable[ClaimResult], total: int) -> Iterator[ClaimResult]:
     """The same, with the progress on standard error if that is a terminal."""
     with Progress() as progress:
         for number, verdict in enumerate(verdicts, 1):
@@ -100,7 +100,7 @@ def _plain(value: Any) -> Any:
     return contract.finite(value) if isinstance(value, float) else value
 
 
-def _listed(ids: Sequence[str]) -> str:
+def _list_as_json(ids: Sequence[str]) -> str:
     """What is claimed and where, as a JSON list; what was not computed is null."""
     from chuteflow.io import contract
     from chuteflow.paper.claims import CLAIMS

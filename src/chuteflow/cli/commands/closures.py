@@ -44,9 +44,9 @@ def command(name: str | None, **given: Any) -> None:
         click.echo(contract.text(_everything()) if given["as_json"] else "\n".join(_list()))
         return
     from chuteflow.theory.constitutive import require_positive
-    from chuteflow.theory.laws import law, settings_added
+    from chuteflow.theory.laws import add_settings, law
 
-    chosen = law(settings_added(name, given["settings"]))
+    chosen = law(add_settings(name, given["settings"]))
     e, slope = given["e"] or _E, given["slope"] or _SLOPE
     require_positive(chosen, e, slope)
     options.require_ratio(slope)
@@ -73,7 +73,7 @@ def _everything() -> dict[str, Any]:
     from chuteflow.theory.radial import RADIALS
 
     return {
-        "closures": [_described(law) for law in known_laws().values()],
+        "closures": [_describe(law) for law in known_laws().values()],
         "radial_functions": [
             {
                 "name": r.name, "description": r.description, "source": r.source, "packing": r.packing,
@@ -85,7 +85,7 @@ def _everything() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _described(law: Law) -> dict[str, Any]:
+def _describe(law: Law) -> dict[str, Any]:
     return {
         "name": law.name, "description": law.description, "source": law.source, "parameters": law.parameters,
         "densest": law.densest, "valid": law.valid, "smooth": law.smooth, "knows_shear_rate": law.knows_slope,
@@ -128,7 +128,7 @@ def _whole(law: Law, e: float, slope: float) -> dict[str, Any]:
     nu = np.array([value for value in _DENSITIES if value < law.densest])
     values = functions(law, nu, e, slope)
     return {
-        **_described(law),
+        **_describe(law),
         "e": e,
         "slope": slope,
         "breaks": list(law.breaks_at(e, slope)),

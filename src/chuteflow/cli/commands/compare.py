@@ -74,8 +74,8 @@ def command(run: str, closures: tuple[str, ...], **given: Any) -> None:
     names = options.closure_names(closures)
     found = compare(measured, names, mappings)
     fits = [] if given["fit"] is None else _fits(measured, names, given["fit"])
-    content = _content(found) | ({} if given["fit"] is None else _fitted_content(fits))
-    report = chain(_report(found), _fitted_report(measured, fits) if fits else ())
+    content = _content(found) | ({} if given["fit"] is None else _content_of_fits(fits))
+    report = chain(_report(found), _report_fits(measured, fits) if fits else ())
     options.deliver_object(given, content, report, partial(_rows, found), partial(plot_comparison, found))
 
 
@@ -83,12 +83,12 @@ def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[
     """For each closure the fit, or why there is none."""
     from chuteflow.dem.recovery import recover
     from chuteflow.errors import ChuteflowError
-    from chuteflow.steady.free import chosen_parameters
+    from chuteflow.steady.free import choose_parameters
 
     names = [name.strip() for name in free.split(",") if name.strip()]
     if not names:
         raise InputError("--fit: which parameters are to be found, for example --fit e,ew,roughness?")
-    chosen_parameters(measured.chute(measured.roughness), names, {})
+    choose_parameters(measured.chute(measured.roughness), names, {})
     found: list[tuple[str, Recovery | str]] = []
     for closure in closures:
         try:
@@ -98,14 +98,14 @@ def _fits(measured: Measured, closures: Sequence[str], free: str) -> list[tuple[
     return found
 
 
-def _fitted_content(fits: Sequence[tuple[str, Recovery | str]]) -> dict[str, Any]:
+def _content_of_fits(fits: Sequence[tuple[str, Recovery | str]]) -> dict[str, Any]:
     from chuteflow.io.fit_records import comparison_object
 
     done = [one.fit for _, one in fits if not isinstance(one, str)]
     return comparison_object(done, [f"{closure}: {one}" for closure, one in fits if isinstance(one, str)])
 
 
-def _fitted_report(measured: Measured, fits: Sequence[tuple[str, Recovery | str]]) -> Iterator[str]:
+def _report_fits(measured: Measured, fits: Sequence[tuple[str, Recovery | str]]) -> Iterator[str]:
     from chuteflow.dem.recovery import FITTED
     from chuteflow.io import tables
 
@@ -210,7 +210,7 @@ def _report(found: Comparison) -> Iterator[str]:
             tables.number(one.flow.mass_flux),
             *(_cell(one.differences, name) for name in _COLUMNS),
         ]
-        for one in _shown(found)
+        for one in _choose_shown(found)
     ]
     yield tables.table([header, *rows], words=(0, 1, 2)) if rows else "none has this hold-up or flux"
     for closure, mapping, condition, reason in found.reasons:
@@ -227,7 +227,7 @@ def _report(found: Comparison) -> Iterator[str]:
     yield from sentences(found)
 
 
-def _shown(found: Comparison) -> Iterator[Candidate]:
+def _choose_shown(found: Comparison) -> Iterator[Candidate]:
     """The flows at the measured hold-up, and of those at the measured flux the one whose hold-up is nearest."""
     groups: dict[tuple[str, str, str], list[Candidate]] = {}
     for one in found.candidates:

@@ -89,7 +89,7 @@ def run_command(**given: Any) -> None:
     require_processes(processes)
     if not given["write_only"]:
         engine(processes)
-    run = prepare(given["out"], *_asked(given))
+    run = prepare(given["out"], *_read_scene(given))
     if given["write_only"]:
         click.echo(_where_to_run(run))
         return
@@ -130,8 +130,8 @@ def study_command(**given: Any) -> None:
     from chuteflow.dem import records
     from chuteflow.dem.engine import engine, require_processes
     from chuteflow.dem.measured import measure
-    from chuteflow.dem.results import thinned
-    from chuteflow.dem.study import cases, prepared
+    from chuteflow.dem.results import thin
+    from chuteflow.dem.study import cases, prepare_case
 
     if given["out"] is None:
         raise InputError("missing --out FOLDER, for example --out study")
@@ -145,9 +145,9 @@ def study_command(**given: Any) -> None:
         file = os.path.join(data, f"{case.name}.csv")
         if not os.path.exists(file):
             options.note(f"run {number} of {len(every)}: {case.name}")
-            run = prepared(case, given["out"])
+            run = prepare_case(case, given["out"])
             _carry_out(run, processes)
-            records.save(thinned(measure(run)), file)
+            records.save(thin(measure(run)), file)
     click.echo(f"{len(every)} runs are in {data}")
 
 
@@ -184,7 +184,7 @@ def waves_command(source: str, **given: Any) -> None:
         f"{100.0 * grown.explained:.3g} % of its mean square"
     )
     if given["save"] is not None:
-        write_whole(given["save"], waves.written(found))
+        write_whole(given["save"], waves.format_csv(found))
         click.echo(f"written: {given['save']}")
 
 
@@ -210,7 +210,7 @@ def results_command(folder: str, closures: tuple[str, ...], **given: Any) -> Non
     options.deliver({**given, "as_json": False}, dict, [text], None, lambda: plot_results(found))
 
 
-def _asked(given: dict[str, Any]) -> tuple[Scene, Schedule]:
+def _read_scene(given: dict[str, Any]) -> tuple[Scene, Schedule]:
     from chuteflow.dem.contacts import Bounds
     from chuteflow.dem.scene import Scene
     from chuteflow.dem.script import Schedule

@@ -39,7 +39,7 @@ def command(**given: Any) -> None:
         raise InputError("missing --unknown: which parameters are to be found, for example --unknown slope?")
     chute = chute_with(given, unknown)
     scales = options.scales(given)
-    wanted = _wanted(given, None if "slope" in unknown else chute.slope, scales)
+    wanted = _read_conditions(given, None if "slope" in unknown else chute.slope, scales)
     from chuteflow.fitting.design import design
     from chuteflow.io.fit_records import design_object, design_rows
 
@@ -48,7 +48,7 @@ def command(**given: Any) -> None:
     options.deliver_object(given, content, _report(found, scales), lambda: design_rows(found, scales), None)
 
 
-def _wanted(given: dict[str, Any], slope: float | None, scales: Scales | None) -> dict[str, float]:
+def _read_conditions(given: dict[str, Any], slope: float | None, scales: Scales | None) -> dict[str, float]:
     """The numbers that the flow is to have, dimensionless; ``slope`` is None where it is unknown."""
     from chuteflow.checks import number_in
 

@@ -138,7 +138,7 @@ def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
     parts = shares(found)
     for name, (_, values) in CLASSES.items():
         for value, fraction in parts[name].items():
-            rows.append([name, _named(int(value), values, name in BITS), f"{fraction:.2%}"])
+            rows.append([name, _name(int(value), values, name in BITS), f"{fraction:.2%}"])
     of = None if "slope" in (x.name, y.name) else scales
     for temperature, part in zip(plane.temperatures, parts["exists_at"], strict=True):
         at = words.amount("surface_temperature", temperature, plane.chute, of) if of else f"{temperature:g}"
@@ -154,7 +154,7 @@ def _report(found: Domain, scales: Scales | None) -> Iterator[str]:
         yield "temperatures and hold-ups are dimensionless: their scales change with the slope"
 
 
-def _named(value: int, values: Mapping[int, str], bits: bool) -> str:
+def _name(value: int, values: Mapping[int, str], bits: bool) -> str:
     if bits:
         return " and ".join(name for bit, name in values.items() if value & bit) or "no flow"
     return values.get(value, str(value)).replace("_", " ")

@@ -10,7 +10,7 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.cli.progress import Progress
-from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, computed, drawn, incomplete, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, WITHOUT_METHOD, compute, drawn, incomplete, method_note
 from chuteflow.processes import available_cores
 
 
@@ -67,7 +67,7 @@ def command(only: list[int] | None, out: str | None, kind: str | None, method: s
         begin = time.perf_counter()
         with Progress() as progress:
             progress.show(f"figure {number} ...")
-            data = computed(number, flows)
+            data = compute(number, flows)
             write_figure(drawn(number, data), path)
             write_whole(path.with_suffix(".csv"), csv_text(data, method_note(number, flows)))
         unchanged = (

@@ -130,9 +130,9 @@ def _closures(given: Mapping[str, Any]) -> list[str]:
     """The closures that are compared: several separated by commas, where none has parameters of its own."""
     text = given["closure"] or "lun"
     if given["settings"]:
-        from chuteflow.theory.laws import settings_added
+        from chuteflow.theory.laws import add_settings
 
-        return [settings_added(text, given["settings"])]
+        return [add_settings(text, given["settings"])]
     return [text] if "=" in text else [name.strip() for name in text.split(",") if name.strip()]
 
 

@@ -71,7 +71,7 @@ def command(**given: Any) -> None:
     )
 
 
-def hidden_and_unresolved(growth: Any, unresolved: Any) -> Iterator[str]:
+def describe_unknown_points(growth: Any, unresolved: Any) -> Iterator[str]:
     """At how many points of a map no mode is resolved, and at how many it is not known whether something grows."""
     hidden = int((np.isnan(growth) & ~unresolved).sum())
     if hidden:
@@ -89,23 +89,23 @@ def _report(found: WaveMap, scales: Scales | None) -> Iterator[str]:
     flow = found.flow
     yield from words.introduction(flow.chute, scales)
 
-    def said(name: str, value: float) -> str:
+    def show(name: str, value: float) -> str:
         return words.amount(name, value, flow.chute, scales)
 
-    yield (f"flow: Q = {said('mass_flux', flow.mass_flux)}, h = {said('centre_of_mass', flow.centre_of_mass)}")
+    yield (f"flow: Q = {show('mass_flux', flow.mass_flux)}, h = {show('centre_of_mass', flow.centre_of_mass)}")
     yield ""
     growth = np.where(np.isfinite(found.growth), found.growth, -np.inf)
     i, j = np.unravel_index(int(growth.argmax()), growth.shape)
     if np.isfinite(growth[i, j]):
         yield (
-            f"largest growth on the map: {said('growth', float(growth[i, j]))} at kx = "
-            f"{said('wavenumber', float(found.kx[i]))}, ky = {said('wavenumber', float(found.ky[j]))}"
+            f"largest growth on the map: {show('growth', float(growth[i, j]))} at kx = "
+            f"{show('wavenumber', float(found.kx[i]))}, ky = {show('wavenumber', float(found.ky[j]))}"
         )
     yield (
         f"growing: {int(found.grows.sum())} of {growth.size} points; growth below {_least(found, scales)} or below "
         "its error counts as none"
     )
-    yield from hidden_and_unresolved(found.growth, found.unresolved)
+    yield from describe_unknown_points(found.growth, found.unresolved)
     yield ""
     if not found.neutral:
         yield "no neutral curve in this range"

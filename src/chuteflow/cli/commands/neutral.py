@@ -9,7 +9,7 @@ import click
 
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
-from chuteflow.cli.commands.growth import SAVED, hidden_and_unresolved
+from chuteflow.cli.commands.growth import SAVED, describe_unknown_points
 from chuteflow.cli.progress import Progress
 from chuteflow.errors import InputError
 
@@ -99,7 +99,7 @@ def _report(found: FamilyMap, scales: Scales | None) -> Iterator[str]:
     )
     yield ""
     yield f"growing: {int(found.grows.sum())} of {found.growth.size} points"
-    yield from hidden_and_unresolved(found.growth, found.unresolved)
+    yield from describe_unknown_points(found.growth, found.unresolved)
     if not found.neutral:
         yield f"no neutral curve: {_without(found)}"
         return

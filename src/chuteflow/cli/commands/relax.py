@@ -85,7 +85,7 @@ def command(**given: Any) -> None:
     options.deliver_object(
         given,
         _content(flow, table, end, scales),
-        _told(flow, moments, end, scales),
+        _describe(flow, moments, end, scales),
         lambda: table.rows(_COLUMNS),
         plotted,
     )
@@ -110,7 +110,7 @@ def _content(flow: Flow, table: Dataset, end: Outcome, scales: Scales | None) ->
     }
 
 
-def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Iterator[str]:
+def _describe(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: Scales | None) -> Iterator[str]:
     from chuteflow.io import words
     from chuteflow.io.contract import factor
     from chuteflow.io.tables import number, table
@@ -130,28 +130,28 @@ def _told(flow: Flow, moments: Sequence[RelaxationState], end: Outcome, scales: 
 def _verdict(flow: Flow, last: RelaxationState, end: Outcome, scales: Scales | None) -> str:
     from chuteflow.io.words import amount
 
-    def said(name: str, value: float) -> str:
+    def show(name: str, value: float) -> str:
         return amount(name, value, flow.chute, scales)
 
-    ended = said("time", last.time)
+    ended = show("time", last.time)
     if end.arrested:
         return f"it comes to rest at t = {ended}: collisions take more energy than the slope gives"
     if end.nearest is None:
-        return f"no steady flow has this hold-up within the range searched, M = {said('mass_holdup', flow.mass_holdup)}"
+        return f"no steady flow has this hold-up within the range searched, M = {show('mass_holdup', flow.mass_holdup)}"
     target = end.steady[end.nearest]
     same = abs(target.surface_temperature / flow.surface_temperature - 1.0) < 1e-6
     name = (
         "the flow it came from"
         if same
-        else f"another flow of the same hold-up, Q = {said('mass_flux', target.mass_flux)}"
+        else f"another flow of the same hold-up, Q = {show('mass_flux', target.mass_flux)}"
     )
     away = f"{100.0 * end.distance:.2g} % away"
     if end.distance < _SETTLED:
         return f"it has come to {name}: {away} at t = {ended}"
-    rate = f"the distance changed at the rate {said('growth', end.rate)} in the last fifth of the time"
+    rate = f"the distance changed at the rate {show('growth', end.rate)} in the last fifth of the time"
     if end.leading is not None:
         rate += (
-            f" (the leading discrete mode of that flow has the rate {said('growth', end.leading)}; what is slower "
+            f" (the leading discrete mode of that flow has the rate {show('growth', end.leading)}; what is slower "
             "belongs to the continuous spectrum and depends on the grid)"
         )
     if end.distance < _ARRIVED and end.rate < 0.0:

@@ -11,7 +11,7 @@ import click
 from chuteflow.cli import options
 from chuteflow.cli.commands import COMMANDS
 from chuteflow.cli.commands.figures import METHOD_HELP, FigureNumbers
-from chuteflow.paper.figures import FIGURES, METHODS, computed, drawn, method_note
+from chuteflow.paper.figures import FIGURES, METHODS, compute, drawn, method_note
 from chuteflow.processes import available_cores
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def command(out: str | None, method: str | None, only: list[int] | None, no_clai
     from chuteflow.paper.sources import source
 
     flows = source(method or METHODS[0], available_cores())
-    figures = [_drawn(number, flows) for number in only or FIGURES]
-    verdicts = [] if no_claims else _checked()
+    figures = [_draw_figure(number, flows) for number in only or FIGURES]
+    verdicts = [] if no_claims else _check_claims()
     report = Report(figures, verdicts, flows.words, started, time.perf_counter() - begin)
     write_whole(path, page(report))
     click.echo(f"{path}: {len(figures)} figures, {len(verdicts)} claims, {report.seconds:.0f} s")
@@ -52,13 +52,13 @@ def _tell(progress: str) -> None:
         click.echo(progress, err=True)
 
 
-def _drawn(number: int, flows: Source) -> ShownFigure:
+def _draw_figure(number: int, flows: Source) -> ShownFigure:
     from chuteflow.paper.captions import CAPTIONS
     from chuteflow.paper.facts import facts
     from chuteflow.paper.report import ShownFigure, picture
 
     begin = time.perf_counter()
-    data = computed(number, flows)
+    data = compute(number, flows)
     found = ShownFigure(
         number=number,
         title=FIGURES[number],
@@ -71,7 +71,7 @@ def _drawn(number: int, flows: Source) -> ShownFigure:
     return found
 
 
-def _checked() -> list[ClaimResult]:
+def _check_claims() -> list[ClaimResult]:
     from chuteflow.paper.claims import CLAIMS, check
 
     found = []

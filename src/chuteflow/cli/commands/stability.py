@@ -140,9 +140,9 @@ def _report(
         yield tables.table([*head, *rows], words=(5, 6))
         yield ""
         for i, answer in enumerate(answers, 1):
-            yield f"{i}  {words.among(answer.flow, found)}: {_said(answer, scales)}"
+            yield f"{i}  {words.among(answer.flow, found)}: {_describe(answer, scales)}"
             if answer.budget is not None:
-                yield f"   {_fed(answer.budget, _DisturbanceFormat(found.chute, scales))}"
+                yield f"   {_describe_budget(answer.budget, _DisturbanceFormat(found.chute, scales))}"
     yield from words.search_outcome(found, scales, near)
 
 
@@ -183,12 +183,12 @@ def _rows(number: str, answer: StabilityAnswer, columns: Sequence[str], scales: 
         yield [*place, mode.kind, *numbers, speed, f"{rate * mode.error:.0e}"]
 
 
-def _said(answer: StabilityAnswer, scales: Scales | None) -> str:
+def _describe(answer: StabilityAnswer, scales: Scales | None) -> str:
     found, said = answer.found, _DisturbanceFormat(answer.flow.chute, scales)
     return _of_all(found, said) if found.complete else _of_some(found, said)
 
 
-def _fed(budget: ModeBudget, said: _DisturbanceFormat) -> str:
+def _describe_budget(budget: ModeBudget, said: _DisturbanceFormat) -> str:
     """What feeds a mode and what it loses most by, of its energy budget."""
     terms = sorted(budget.terms, key=lambda term: -term.total)
     formatted = ", ".join(f"{term.name} {said('growth', term.total)}" for term in (*terms[:2], *terms[-2:]))

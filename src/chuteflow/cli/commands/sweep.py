@@ -91,7 +91,7 @@ def command(study: str, **given: Any) -> None:
             raise InputError(f"there is no store {given['out']} yet: omit --status to create it")
         click.echo("\n".join(_status(Store.made(given["out"], read_study), check=not given["no_check"])))
         return
-    chosen = _chosen(read_study, given["chunks"])
+    chosen = _choose_chunks(read_study, given["chunks"])
     workers = _workers(given["workers"], given["cluster"])
     store = Store.made(given["out"], read_study)
     _run(store, chosen, workers, alone=given["chunks"] is None, check=not given["no_check"])
@@ -116,7 +116,7 @@ def _count(given: int | None) -> int:
     return given
 
 
-def _chosen(study: Study, slices: Sequence[slice] | None) -> Sequence[int]:
+def _choose_chunks(study: Study, slices: Sequence[slice] | None) -> Sequence[int]:
     every = range(study.chunks)
     if slices is None:
         return every
@@ -155,7 +155,7 @@ def _begin(store: Store, found: _CheckedChunks, *, computing: bool) -> None:
     """Put the metadata in order, and say what has to be known of the store before chunks are added."""
     from chuteflow.sweeps.store import StoreError
 
-    for name in store.damaged_metadata():
+    for name in store.find_damaged_metadata():
         click.echo(f"the metadata of {name or 'the store'} are damaged: written again", err=True)
     others = [version for version in found.totals.versions if version != __version__]
     if others and computing:
@@ -306,7 +306,7 @@ def _status(store: Store, *, check: bool) -> Iterator[str]:
     elif found.unchecked:
         yield f"{found.unchecked} chunks have no checksums: their counts and parameters have been checked alone"
     again = "the same command without --status"
-    for name in store.damaged_metadata():
+    for name in store.find_damaged_metadata():
         yield f"the metadata of {name or 'the store'} are damaged: {again} writes them again"
     for line in found.damage_lines():
         yield f"{line}: {again} computes it again"

@@ -136,7 +136,7 @@ def no_analytic_solution() -> Finding:
     differences = {}
     for value in (1.0, -1.0):
         exact, s = hot_solution(value), np.linspace(0.05, 1.0, 20)
-        shot = _shot(value, tuple(s.tolist()))
+        shot = _shoot(value, tuple(s.tolist()))
         P = shot.psi * shot.tau  # P = psi tau at the same s
         psi, tau = exact.psi(P), exact.tau(P)
         worst = max(np.abs(psi / shot.psi - 1.0).max(), np.abs(tau / shot.tau - 1.0).max())
@@ -153,7 +153,7 @@ def no_analytic_solution() -> Finding:
 
 
 @cache
-def _shot(lambda_: float, s: tuple[float, ...], mu: float = 0.0) -> ShootingSolution:
+def _shoot(lambda_: float, s: tuple[float, ...], mu: float = 0.0) -> ShootingSolution:
     return shoot(lambda_, mu, np.array(s))
 
 
@@ -328,7 +328,7 @@ def local_series() -> Finding:
 def shooting_constant() -> Finding:
     """c by the exact solution and by shooting."""
     exact = hot_solution(1.0).c
-    shot = _shot(1.0, tuple(np.linspace(0.05, 1.0, 20).tolist())).c
+    shot = _shoot(1.0, tuple(np.linspace(0.05, 1.0, 20).tolist())).c
     return decide(
         4.5861,
         exact,
@@ -345,7 +345,7 @@ def _order(which: int) -> float:
     """The power of lambda with which psi, tau or U of the expansion differ from the exact solution."""
     errors = []
     for value in (_SMALL, _SMALLER):
-        shot = _shot(value, _S, _MU)
+        shot = _shoot(value, _S, _MU)
         exact: Array = (shot.psi, shot.tau, shot.U)[which]
         errors.append(float(np.abs(expansion(value, np.array(_S), _MU)[which] - exact).max()))
     return math.log(errors[0] / errors[1]) / math.log(_SMALL / _SMALLER)
@@ -376,7 +376,7 @@ def expansion_of_psi_and_tau() -> Finding:
 def expansion_of_velocity() -> Finding:
     """U at the base, where (4.17) makes it sqrt(tau), as printed and with 1 for F10."""
     F10 = _model(dissipative(SLOPE)).parameters.F10
-    shot = _shot(_SMALLER, _S, _MU)
+    shot = _shoot(_SMALLER, _S, _MU)
     printed = F10 * (1.0 + _SMALLER / 3.0 + 5.0 / 36.0 * _SMALLER**2)
     order = _order(2)
     exact = float(shot.U[-1])

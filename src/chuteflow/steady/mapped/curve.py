@@ -101,7 +101,7 @@ def _side(
 ) -> Side[MappedSolution]:
     """From ``first`` on, towards larger (1) or smaller (-1) S."""
     degree = min(d for d in DEGREES if d >= min(first.degree, LARGEST_DEGREE))
-    system, matrix = first.system.transferred(degree, first.system.multiple)
+    system, matrix = first.system.transfer(degree, first.system.multiple)
     z = matrix @ first.z
     ahead = np.zeros(len(z))
     ahead[-2] = direction

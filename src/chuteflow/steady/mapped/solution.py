@@ -54,7 +54,7 @@ from chuteflow.steady.chute import Chute
 from chuteflow.steady.collocation import LOG_H, LOG_M, LOG_Q, LOG_T
 from chuteflow.steady.flow import Flow, Profile
 from chuteflow.steady.kinds import density_kind
-from chuteflow.steady.solver import TOLERANCE, Condition, SolverStatus, checked_tolerance
+from chuteflow.steady.solver import TOLERANCE, Condition, SolverStatus, check_tolerance
 from chuteflow.theory import boundary
 from chuteflow.theory.bases import require_richman
 from chuteflow.theory.constitutive import WALL_CONTACT, Field
@@ -295,7 +295,7 @@ class MappedSystem:
         thick = x > _THIN * x.max()
         return float((-dx[thick] / x[thick]).max())
 
-    def transferred(self, degree: int, multiple: int) -> tuple[MappedSystem, Array]:
+    def transfer(self, degree: int, multiple: int) -> tuple[MappedSystem, Array]:
         """The system of another degree and multiple, and the matrix that takes z, or a tangent, to it."""
         other = MappedSystem(self.chute, degree, multiple)
         # exp(-z/L) is a fixed power of exp(-z/L'), whatever T_inf is.
@@ -312,7 +312,7 @@ class MappedSystem:
         matrix[-2:, -2:] = np.eye(2)
         return other, matrix
 
-    def adapted(self, z: Array, tangent: Array) -> tuple[MappedSystem, Array, Array] | None:
+    def adapt(self, z: Array, tangent: Array) -> tuple[MappedSystem, Array, Array] | None:
         """More or fewer coefficients, or another multiple, where the solution asks for it."""
         a, b, _, _ = self.split(z)
         decay = max(_decay(a), _decay(b))
@@ -328,7 +328,7 @@ class MappedSystem:
                 multiple = best
         if (degree, multiple) == (self.degree, self.multiple):
             return None
-        other, matrix = self.transferred(degree, multiple)
+        other, matrix = self.transfer(degree, multiple)
         return other, matrix @ z, matrix @ tangent
 
 
@@ -592,8 +592,8 @@ def solve_mapped(
     Raises:
         InputError: for a degree or multiple out of range, or a start with another surface.
     """
-    system, z = _placed(chute, start, degree, multiple)
-    return _solved(system, z, condition)
+    system, z = _place(chute, start, degree, multiple)
+    return _solve(system, z, condition)
 
 
 def refine(
@@ -614,21 +614,21 @@ def refine(
     Raises:
         InputError: for a tolerance, degree or multiple out of range, or a start with another surface.
     """
-    tolerance = checked_tolerance(tolerance)
-    system, z = _placed(chute, start, largest_degree, multiple)
+    tolerance = check_tolerance(tolerance)
+    system, z = _place(chute, start, largest_degree, multiple)
     a, b, _, _ = system.split(z)
     degree = min(max(8, _length(a, 0.03 * tolerance), _length(b, 0.03 * tolerance)), largest_degree)
     iterations = 0
     while True:
-        smaller, matrix = system.transferred(degree, system.multiple)
-        found = _solved(smaller, matrix @ z, condition)
+        smaller, matrix = system.transfer(degree, system.multiple)
+        found = _solve(smaller, matrix @ z, condition)
         iterations += found.iterations
         if found.converged and found.error <= tolerance:
             return replace(found, iterations=iterations)
         growth = 1.5
         if found.converged:
             found = replace(found, status=SolverStatus.UNRESOLVED)
-            z = smaller.transferred(largest_degree, system.multiple)[1] @ found.z
+            z = smaller.transfer(largest_degree, system.multiple)[1] @ found.z
             # The error falls by the same factor with each coefficient more.
             growth = float(np.clip(np.log(0.1 * tolerance) / np.log(min(found.error, 0.1)), 1.1, 2.0))
         if degree == largest_degree:
@@ -636,9 +636,7 @@ def refine(
         degree = min(int(np.ceil(growth * degree)), largest_degree)
 
 
-def _placed(
-    chute: Chute, start: Flow | MappedSolution, degree: int, multiple: int | None
-) -> tuple[MappedSystem, Array]:
+def _place(chute: Chute, start: Flow | MappedSolution, degree: int, multiple: int | None) -> tuple[MappedSystem, Array]:
     """The system of ``degree``, and ``start`` on it."""
     require_richman(chute.base, "the mapped method is")
     if start.chute.surface != chute.surface:
@@ -650,12 +648,12 @@ def _placed(
         multiple = best_multiple(start.centre_of_mass / start.surface_temperature)
     system = MappedSystem(chute, degree, multiple)
     if isinstance(start, Flow):
-        return system, _sampled(system, start)
+        return system, _sample(system, start)
     near = MappedSystem(chute, start.degree, start.system.multiple)
-    return system, near.transferred(degree, system.multiple)[1] @ start.z
+    return system, near.transfer(degree, system.multiple)[1] @ start.z
 
 
-def _sampled(system: MappedSystem, flow: Flow) -> Array:
+def _sample(system: MappedSystem, flow: Flow) -> Array:
     """The unknowns z of a flow that is known at all heights."""
     scale = flow.interface_height if system.interface else flow.surface_temperature
 
@@ -674,7 +672,7 @@ def _sampled(system: MappedSystem, flow: Flow) -> Array:
     return np.concatenate([a, b, np.log([scale, flow.mass_flux])])
 
 
-def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolution:
+def _solve(system: MappedSystem, z: Array, condition: Condition) -> MappedSolution:
     """The flow near ``z`` that meets ``condition``, and its error.
 
     The error is estimated by the change in ln Q, ln h and ln M in one step of Newton's method at a larger degree, and
@@ -694,7 +692,7 @@ def _solved(system: MappedSystem, z: Array, condition: Condition) -> MappedSolut
             system, z, np.full(4, np.nan), np.inf, np.inf, SolverStatus.NO_CONVERGENCE, result.iterations
         )
     macroscopic = system.macroscopic(z)
-    larger, matrix = system.transferred(int(np.ceil(_CHECK * system.degree)), system.multiple)
+    larger, matrix = system.transfer(int(np.ceil(_CHECK * system.degree)), system.multiple)
     residual, jacobian, near, gradient = step(larger, matrix @ z)
     try:
         check = near - gradient @ np.linalg.solve(jacobian, residual)
