@@ -112,17 +112,23 @@ function drawRates(flow, i) {
   if (!flow) { svg.innerHTML = ""; byId("budget-key").textContent = ""; return; }
   const { z, production, dissipation } = flow.profile, s = factor("gamma"), sz = factor("z");
   const terms = [production, production.map((work, n) => dissipation[n] - work), dissipation.map((loss) => -loss)];
-  const largest = Math.max(...terms.flat().map(Math.abs)) * s * 1.05 || 1, top = 2.5 * flow.h;
-  const within = z.filter((height) => height <= top * 1.000001).length;
+  const largest = Math.max(...terms.flat().map(Math.abs)) * s * 1.05 || 1, top = Math.min(2.5 * flow.h, z.at(-1));
+  const within = z.filter((height) => height <= top).length;
+  // The points up to the top, and one there between its neighbours.
+  const upToTop = (values) => {
+    const fraction = within < z.length ? (top - z[within - 1]) / (z[within] - z[within - 1]) : 0;
+    const last = fraction > 0 ? [[values[within - 1] + fraction * (values[within] - values[within - 1]), top]] : [];
+    return [...values.slice(0, within).map((v, n) => [v, z[n]]), ...last];
+  };
   const shown = draw(svg, {
     x: { low: -largest, high: largest, label: labelled("gain of fluctuation energy per volume", "gamma") },
-    y: { low: 0, high: z[within - 1] * sz, label: labelled("height z", "z") },
-    lines: terms.map((term, k) => ({ points: term.slice(0, within).map((v, n) => [v * s, z[n] * sz]), colour: flowColour(i), dash: dashes[k] })),
+    y: { low: 0, high: top * sz, label: labelled("height z", "z") },
+    lines: terms.map((term, k) => ({ points: upToTop(term).map(([v, height]) => [v * s, height * sz]), colour: flowColour(i), dash: dashes[k] })),
     hair: 0,
   });
   const labels = ["work", "conduction", "dissipation"];
   const lines = terms.map((term, k) => ({ z, values: term, colour: flowColour(i), label: labels[k], factor: s }));
-  charts.set(svg.id, { shown, top: z[within - 1], lines });
+  charts.set(svg.id, { shown, top, lines });
   if (height !== null) read();
   const inner = dissipation.slice(0, within), wins = production.slice(0, within).map((work, n) => work - inner[n]);
   const heated = wins.every((v) => v <= 0) ? "conduction brings heat at every height" : wins.every((v) => v >= 0) ? "conduction takes heat at every height" : "conduction takes heat from where work exceeds dissipation to where it does not";
