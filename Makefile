@@ -119,10 +119,14 @@ $(VENV)/.packages-run: pyproject.toml constraints.txt | $(VENV)/.package
 	@$(INSTALL) "$(WHEEL)[explore,sweep,units]"
 	@touch $@
 
-# The loops of the search are compiled at their first call, and kept beside the package.
+# The loops of searches, of maps and of laws with breaks are compiled at their first call, and kept beside the package.
+COMPILE = from chuteflow import Chute, curve, domain; \
+	curve(Chute(0.3, 0.8, 0.8, 0.6), points=10); \
+	curve(Chute(0.3, 0.8, 0.8, 0.6, closure='extended'), points=10); \
+	domain(Chute(0.3, 0.8, 0.8, 0.6), ('slope', 0.25, 0.35), ('roughness', 0.55, 0.65), size=(3, 3), tolerance=0.1)
 $(VENV)/.compiled: $(VENV)/.package $(VENV)/.packages-run
 	@echo "== compiling the search"
-	@$(BIN)/python -W ignore -c "import chuteflow; chuteflow.curve(chuteflow.Chute(0.3, 0.8, 0.8, 0.6), points=10)" 2>/dev/null
+	@$(BIN)/python -W ignore -c "$(COMPILE)" 2>/dev/null
 	@touch $@
 
 # After the others, never beside them: with make -j, two pips would write into one environment at once.
