@@ -15,11 +15,15 @@ def number(value: float) -> str:
     return f"{value:.5g}" if math.isfinite(value) else "-"
 
 
-def line(kind: str, *parts: str | None, **numbers: float) -> str:
-    """``<kind: parts; name = number, ...>``; a part that is None or empty is left out."""
+def line(kind: str, *parts: str | None, error: float | None = None, **numbers: float) -> str:
+    """``<kind: parts; name = number, ..., error = ...>``; a part that is None or empty is left out; an error has one
+    digit."""
     said = [part for part in parts if part]
-    if numbers:
-        said.append(", ".join(f"{name} = {number(value)}" for name, value in numbers.items()))
+    pairs = [f"{name} = {number(value)}" for name, value in numbers.items()]
+    if error is not None:
+        pairs.append(f"error = {error:.0e}")
+    if pairs:
+        said.append(", ".join(pairs))
     return f"<{kind}: {'; '.join(said)}>" if said else f"<{kind}>"
 
 
