@@ -9,7 +9,7 @@ import pytest
 
 import chuteflow
 from chuteflow import progress
-from chuteflow.progress import ProgressLine, told
+from chuteflow.progress import ProgressLine, report_progress
 
 
 class Terminal(io.StringIO):
@@ -92,7 +92,7 @@ def test_a_stream_that_is_none_is_no_terminal(stream, monkeypatch):
 def test_a_function_that_is_given_is_called_instead(monkeypatch):
     terminal = opened(monkeypatch)
     fractions = []
-    with told("scan", fractions.append) as tell:
+    with report_progress("scan", fractions.append) as tell:
         tell(0.5)
     assert fractions == [0.5]
     assert terminal.getvalue() == ""

@@ -58,7 +58,7 @@ class ProgressLine:
 
 
 @contextmanager
-def told(what: str, given: Callable[[float], Any] | None) -> Iterator[Callable[[float], Any]]:
+def report_progress(what: str, given: Callable[[float], Any] | None) -> Iterator[Callable[[float], Any]]:
     """What is called with the fraction that is done: the function that is ``given``, or where there is none a line that
     says ``what`` it is."""
     if given is not None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import chuteflow
-from chuteflow.errors import InputError
+from chuteflow.errors import InputError, SolveError
+from chuteflow.stability import planes
 from chuteflow.stability.modes import Disturbances
 from chuteflow.stability.neutral import EigenvalueGrid, neutral_curves
 from chuteflow.stability.planes import FamilyPlane, family_map, wave_map
@@ -100,6 +101,24 @@ def test_on_the_neutral_curve_of_flow_a_the_leading_mode_neither_grows_nor_decay
     # The map and the curve agree on which of its points grow.
     lone = disturbances.modes(float(found.kx[1]), float(found.ky[2]))[0]
     assert found.growth[1, 2] == pytest.approx(lone.growth, abs=1e-5)
+
+
+def test_a_flow_that_cannot_be_solved_ends_no_map(monkeypatch):
+    flows = chuteflow.curve(PAPER, surface_temperature=(0.5, 8.0), points=12).branches[0].flows
+    between = planes.flow_between
+
+    def failing(flows, position):
+        if 4.5 < position < 6.5:
+            raise SolveError("no")
+        return between(flows, position)
+
+    monkeypatch.setattr(planes, "flow_between", failing)
+    monkeypatch.setattr(planes, "neutral_curves", lambda *_: [])
+    found = family_map(flows, angle=0.0, depth_wavenumber=(0.01, 0.3), size=(4, 5))
+    assert found.unresolved[:, 2].all()
+    assert not found.unresolved[:, [0, 1, 3, 4]].any()
+    assert np.isnan(found.growth[:, 2]).all()
+    assert np.isfinite(found.growth[:, [0, 4]]).any()
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import ContinuationSettings
 from chuteflow.parameters import LARGEST_HOLDUP, PARAMETERS, SURFACE_TEMPERATURE
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.result import Compared, Result, from_above
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
@@ -220,7 +220,7 @@ def boundary(
         SolveError: where a boundary could not be followed or a point not solved to the tolerance.
     """
     if progress is None:
-        with told("boundary", None) as tell:
+        with report_progress("boundary", None) as tell:
             return boundary(
                 chute,
                 of=of,

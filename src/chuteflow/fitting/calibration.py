@@ -23,7 +23,7 @@ from chuteflow.fitting.residuals import TrialChute, TrialFlow
 from chuteflow.fitting.starts import MANY_TRIALS, StartingPoint, at, candidates
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.steady.chute import Chute
 from chuteflow.steady.flow import Flow
 from chuteflow.steady.free import FreeParameter, choose_parameters, vary
@@ -297,7 +297,7 @@ def fit(
     objective = Objective(cases, base_height, loss)
     _require_enough(objective)
     first = [np.array([parameter.of(chute) for parameter in parameters])]
-    with told("fit", progress) as tell:
+    with report_progress("fit", progress) as tell:
         best, others = _search(objective, first, trials, tell)
     for _ in range(_ROUNDS):
         scale, covariance = _spread(objective, best, measured.errors_known)

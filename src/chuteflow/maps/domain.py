@@ -34,7 +34,7 @@ from chuteflow.maps.outlines import Outline, Region, make_regions, trace_outline
 from chuteflow.maps.plane import CODES, HOT_CODES, ParameterAxis, ParameterPlane, classify, classify_hot
 from chuteflow.parameters import LARGEST_HOLDUP, SURFACE_TEMPERATURE
 from chuteflow.processes import worker_pool
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.threads import on_one_thread
@@ -226,7 +226,7 @@ def domain(
         if progress is not None:
             columns = _columns(plane, tolerance, pool, progress)
         else:
-            with told("domain", None) as tell:
+            with report_progress("domain", None) as tell:
                 columns = _columns(plane, tolerance, pool, lambda done, known: tell(done / known))
     hot_columns = _hot_columns(plane, tolerance) if plane.hot_known else ()
     return Domain.on_cells(plane, size, tolerance, tuple(columns), tuple(hot_columns))

@@ -11,7 +11,7 @@ from chuteflow.branches.curve import curve
 from chuteflow.branches.results import Branch, Curve
 from chuteflow.checks import number
 from chuteflow.errors import InputError
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.stability import relaxation
 from chuteflow.stability.layer import Layer
 from chuteflow.stability.planes import FamilyMap, WaveMap, family_map, wave_map
@@ -46,7 +46,7 @@ def growth(
     Raises:
         InputError: for numbers out of range, and where stability cannot be posed.
     """
-    with told("growth", progress) as tell:
+    with report_progress("growth", progress) as tell:
         return wave_map(flow, kx=kx, ky=ky, size=size, progress=tell)
 
 
@@ -78,7 +78,7 @@ def neutral(
             raise InputError(f"there is no flow: {line.reason}")
         line = line.branches[0]
     flows = line.flows if isinstance(line, Branch) else tuple(line)
-    with told("neutral", progress) as tell:
+    with report_progress("neutral", progress) as tell:
         return family_map(flows, angle=angle, depth_wavenumber=depth_wavenumber, size=size, progress=tell)
 
 
@@ -111,7 +111,7 @@ def relax(
     layer = Layer.of(flow)
     start = disturb(layer.steady(flow), temperature, 1.0 if velocity is None else velocity)
     moments = []
-    with told("relax", None if progress is None else lambda _: progress(moments[-1].time)) as tell:
+    with report_progress("relax", None if progress is None else lambda _: progress(moments[-1].time)) as tell:
         for moment in relaxation.relax(layer, start, duration):
             moments.append(moment)
             tell(moment.time / duration)

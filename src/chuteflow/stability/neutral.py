@@ -21,6 +21,7 @@ from contourpy import contour_generator
 from numpy.typing import NDArray
 
 from chuteflow import display
+from chuteflow.errors import SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.numerics.continuation import ContinuationSettings, ContinuationStatus, CurvePoint, closes, trace
 from chuteflow.numerics.eigenproblem import Complex, refine_eigenvalue
@@ -200,7 +201,11 @@ def _side(
                     side.add(last)
             side.stop(End.EDGE)
             return
-        neutral = system.follow_to(point.z)
+        try:
+            neutral = system.follow_to(point.z)
+        except SolveError:
+            side.stop(End.LOST)
+            return
         if neutral.error > _ASTRAY:
             side.stop(End.CONTINUOUS)
             return
@@ -276,8 +281,11 @@ class _GrowthSystem:
         return np.ones(2)
 
     def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
-        """See chuteflow.numerics.continuation.System."""
-        there = self._follow(z)
+        """See chuteflow.numerics.continuation.System; NaN where the flow or the wave cannot be solved."""
+        try:
+            there = self._follow(z)
+        except SolveError:
+            return np.full(1, np.nan), np.full((1, 2), np.nan)
         if self._accepted.same_mode(there):
             self._trial = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]

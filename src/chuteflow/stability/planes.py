@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from chuteflow import display
 from chuteflow.branches.paths import flow_between
 from chuteflow.checks import check_size, number, pair
-from chuteflow.errors import InputError
+from chuteflow.errors import InputError, SolveError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.result import Result
-from chuteflow.stability.modes import Disturbances, UnresolvedError, check_wavenumbers, leading, smallest_rate
+from chuteflow.stability.modes import Disturbances, check_wavenumbers, leading, smallest_rate
 from chuteflow.stability.neutral import EigenvalueGrid, NeutralCurve, NeutralPlane, neutral_curves
 from chuteflow.stability.result import stability_of
 from chuteflow.steady.flow import Flow
@@ -79,8 +79,12 @@ class FamilyPlane:
         return np.stack([np.exp(self.low + self.unit * z[:, 0]), z[:, 1]], axis=1)
 
     def flow(self, place: float) -> Flow:
-        """The flow at a place between 0 and 1 along the branch, or a little outside."""
-        return self._at(place).flow
+        """The flow at a place between 0 and 1 along the branch, or a little outside; where it cannot be solved, the
+        nearest of those given."""
+        try:
+            return self._at(place).flow
+        except SolveError:
+            return self.flows[int(np.clip(round(place * (len(self.flows) - 1)), 0, len(self.flows) - 1))]
 
     def wave(self, z: Array) -> tuple[Disturbances, float, float]:
         """See :class:`chuteflow.stability.neutral.NeutralPlane`."""
@@ -108,10 +112,10 @@ def scan_plane(plane: NeutralPlane, points: tuple[int, int], progress: Progress 
     # Flows change with b: one after the other.
     for j, up in enumerate(b):
         for i, right in enumerate(a):
-            disturbances, kx, ky = plane.wave(np.array([right, up]))
             try:
+                disturbances, kx, ky = plane.wave(np.array([right, up]))
                 found = leading(disturbances, kx, ky)
-            except UnresolvedError:
+            except SolveError:  # of the wave, or of the flow
                 unresolved[i, j] = True
                 continue
             if found:

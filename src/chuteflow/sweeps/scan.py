@@ -16,7 +16,7 @@ from chuteflow.checks import real_array
 from chuteflow.errors import InputError
 from chuteflow.numerics.chebyshev import Array
 from chuteflow.parameters import BY_KEY, CONDITIONS, LARGEST_HOLDUP, SURFACE_TEMPERATURE
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.result import Result
 from chuteflow.steady.chute import Chute
 from chuteflow.sweeps.engine import Chunk, solve_chunk
@@ -133,7 +133,7 @@ def scan(
     }
     study = from_dict(table, Path())
     chunks: list[Chunk] = []
-    with told("scan", progress) as tell:
+    with report_progress("scan", progress) as tell:
         for number in range(study.chunks):
             chunks.append(solve_chunk(study, number))
             tell(len(chunks) / study.chunks)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chuteflow.processes import available_cores
-from chuteflow.progress import told
+from chuteflow.progress import report_progress
 from chuteflow.sweeps.runner import local_workers, run
 from chuteflow.sweeps.store import Store
 from chuteflow.sweeps.study import Study, from_dict, read
@@ -45,7 +45,7 @@ def sweep(
         left = [chunk for chunk in range(study.chunks) if not store.is_done(chunk)]
         store.mend()
         done = study.chunks - len(left)
-        with told("sweep", progress) as tell:
+        with report_progress("sweep", progress) as tell:
             for _ in run(store, left, local_workers(available_cores() if workers is None else workers)):
                 done += 1
                 tell(done / study.chunks)
