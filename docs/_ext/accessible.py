@@ -20,4 +20,5 @@ def _completed(app: Sphinx, page: str, template: str, context: dict[str, Any], d
         level = 'role="heading" aria-level="2"'
         context["furo_navigation_tree"] = context["furo_navigation_tree"].replace('role="heading"', level)
     if "body" in context:
-        context["body"] = context["body"].replace("<pre>", '<pre tabindex="0">')
+        body = context["body"].replace("<pre>", '<pre tabindex="0">')
+        context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')

@@ -653,7 +653,7 @@ def test_the_chosen_case_is_shown_as_long_as_it_holds(page):
     page.locator("#presets").select_option(label="glass-beads")
     expect(page.locator("#e")).to_have_value("0.97")
     expect(page.locator("#d")).to_have_value("3")
-    expect(page.locator("#case-words")).to_contain_text("Guessed: roughness")
+    expect(page.locator("#case-words")).to_contain_text("guessed: roughness")
     page.locator("#slope-slider").press("ArrowRight")
     expect(shown).to_have_text("glass-beads")
     page.locator("#e-slider").press("ArrowRight")
