@@ -165,11 +165,6 @@ class Scene:
         """How many grains have the hold-up."""
         return max(round(self.holdup * self.area / MASS), 1)
 
-    @property
-    def exact_holdup(self) -> float:
-        """M of the whole number of grains."""
-        return self.grains * MASS / self.area
-
     @cached_property
     def contacts(self) -> Contacts:
         """The contacts: overlaps are bounded at the temperature of the start, or at T = 1 where that is colder, and

@@ -26,8 +26,6 @@ _PROFILES = {"nu": "volume_fraction", "T": "granular_temperature", "u": "velocit
 _NUMBERS = {QUANTITIES[name].symbol: name for name in PLACE}
 #: Files, flows and heights of a flow at most.
 _MOST_FLOWS, _MOST_HEIGHTS = 40, 400
-#: What the page says of a unit where it has no grains.
-_GRAINS_OF_PAGE = "a unit needs the grains: tick SI units, and give their diameter and density there"
 #: A line at the beginning of a table of a particle run.
 _HEAD = re.compile(rb"^#\s*(?:slope|e)\s*=", re.MULTILINE)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 
@@ -36,25 +37,14 @@ def sample_heights(sample: OverburdenSampler, own: float, top: float, tolerance:
     ]
     parts = (np.linspace(0.0, ends[0], _AT_FIRST + 1), np.log(np.linspace(1.0, np.exp(ends[0]), _AT_FIRST + 1)))
     places = np.unique(np.concatenate([*parts, np.linspace(ends[0], ends[1], _AT_FIRST // 2)]))[::-1]
-    found = sample(places)
-    refine = np.ones(len(places) - 1, dtype=bool)
-    for _ in range(_HALVINGS):
-        middles = 0.5 * (places[1:] + places[:-1])[refine]
-        exact = sample(middles)
-        below, above = found[:, :-1][:, refine], found[:, 1:][:, refine]
+
+    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> NDArray[np.bool_]:
         width = above[0] - below[0]
         weight = np.divide(exact[0] - below[0], width, out=np.zeros_like(width), where=width > 0.0)
         linear = below + weight * (above - below)
-        largest = np.abs(found).max(axis=1, keepdims=True)
-        inaccurate = (np.abs(exact - linear) > tolerance * largest)[1:].any(axis=0) & (below[0] < top)
-        between = np.flatnonzero(refine) + 1
-        places, found = np.insert(places, between, middles), np.insert(found, between, exact, axis=1)
-        # Both halves of a refined interval are checked again.
-        halves = np.where(refine, 2, 1)
-        refine[refine] = inaccurate
-        refine = np.repeat(refine, halves)
-        if not inaccurate.any():
-            break
+        return (np.abs(exact - linear) > allowed)[1:].any(axis=0) & (below[0] < top)
+
+    _, found = _halve_intervals(sample, places, tolerance, inaccurate)
     # Close to an interface heights differ by rounding alone.
     apart = np.concatenate([[True], np.diff(found[0]) > _ALIKE * top])
     kept = found[:, apart]
@@ -69,20 +59,38 @@ def refine_heights(samplers: Sequence[Sampler], heights: Array, tolerance: float
     Intervals between ``heights`` are halved until linear interpolation across each is accurate to the fraction
     ``tolerance`` of a field's largest value, at most _HALVINGS times.
     """
-    found = np.array([sampler(heights) for sampler in samplers])
-    refine = np.ones(len(heights) - 1, dtype=bool)
+
+    def sample(places: Array) -> Array:
+        return np.array([sampler(places) for sampler in samplers])
+
+    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> NDArray[np.bool_]:
+        off: NDArray[np.bool_] = np.abs(exact - 0.5 * (below + above)) > allowed
+        return off.reshape(-1, off.shape[-1]).any(axis=0)
+
+    return _halve_intervals(sample, heights, tolerance, inaccurate)
+
+
+def _halve_intervals(
+    sample: Sampler, places: Array, tolerance: float, inaccurate: Callable[..., NDArray[np.bool_]]
+) -> tuple[Array, Array]:
+    """Places with as many between them as it takes, and the values (..., k) there.
+
+    ``inaccurate`` tells of intervals, by the values at both ends and in their middles and the fraction ``tolerance`` of
+    the largest values, which are halved again.
+    """
+    found = sample(places)
+    refine = np.ones(len(places) - 1, dtype=bool)
     for _ in range(_HALVINGS):
-        middles = 0.5 * (heights[1:] + heights[:-1])[refine]
-        exact = np.array([sampler(middles) for sampler in samplers])
-        linear = 0.5 * (found[..., 1:] + found[..., :-1])[..., refine]
-        largest = np.abs(found).max(axis=2, keepdims=True)
-        inaccurate = (np.abs(exact - linear) > tolerance * largest).any(axis=(0, 1))
-        places = np.flatnonzero(refine) + 1
-        heights, found = np.insert(heights, places, middles), np.insert(found, places, exact, axis=2)
+        middles = 0.5 * (places[1:] + places[:-1])[refine]
+        exact = sample(middles)
+        allowed = tolerance * np.abs(found).max(axis=-1, keepdims=True)
+        again = inaccurate(found[..., :-1][..., refine], found[..., 1:][..., refine], exact, allowed)
+        between = np.flatnonzero(refine) + 1
+        places, found = np.insert(places, between, middles), np.insert(found, between, exact, axis=-1)
         # Both halves of a refined interval are checked again.
         halves = np.where(refine, 2, 1)
-        refine[refine] = inaccurate
+        refine[refine] = again
         refine = np.repeat(refine, halves)
-        if not inaccurate.any():
+        if not again.any():
             break
-    return heights, found
+    return places, found

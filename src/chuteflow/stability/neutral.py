@@ -201,9 +201,8 @@ def _side(
                     side.add(last)
             side.stop(End.EDGE)
             return
-        try:
-            neutral = system.follow_to(point.z)
-        except SolveError:
+        neutral = system.follow_to(point.z)
+        if not np.isfinite(neutral.sigma):
             side.stop(End.LOST)
             return
         if neutral.error > _ASTRAY:
@@ -281,11 +280,8 @@ class _GrowthSystem:
         return np.ones(2)
 
     def residual_and_jacobian(self, z: Array) -> tuple[Array, Array]:
-        """See chuteflow.numerics.continuation.System; NaN where the flow or the wave cannot be solved."""
-        try:
-            there = self._follow(z)
-        except SolveError:
-            return np.full(1, np.nan), np.full((1, 2), np.nan)
+        """See chuteflow.numerics.continuation.System."""
+        there = self._follow(z)
         if self._accepted.same_mode(there):
             self._trial = there
         return np.array([there.sigma.real]), np.array(np.real(there.slope), dtype=float)[None]
@@ -309,6 +305,12 @@ class _GrowthSystem:
         return _Eigenvalue(z, sigma, np.array(slope))
 
     def _sigma(self, z: Array, near: complex, level: int = _LEVEL) -> complex:
-        disturbances, kx, ky = self._plane.wave(z)
+        """NaN where the flow cannot be solved."""
+        if not np.isfinite(near):
+            return complex(np.nan, np.nan)
+        try:
+            disturbances, kx, ky = self._plane.wave(z)
+        except SolveError:
+            return complex(np.nan, np.nan)
         of = disturbances.coarse_operator(kx, ky, level)
         return refine_eigenvalue(of.matrix(kx, ky), of.weights, near)[0]
