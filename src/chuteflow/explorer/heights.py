@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chuteflow.numerics.chebyshev import Array
 
@@ -38,7 +38,7 @@ def sample_heights(sample: OverburdenSampler, own: float, top: float, tolerance:
     parts = (np.linspace(0.0, ends[0], _AT_FIRST + 1), np.log(np.linspace(1.0, np.exp(ends[0]), _AT_FIRST + 1)))
     places = np.unique(np.concatenate([*parts, np.linspace(ends[0], ends[1], _AT_FIRST // 2)]))[::-1]
 
-    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> NDArray[np.bool_]:
+    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> Any:
         width = above[0] - below[0]
         weight = np.divide(exact[0] - below[0], width, out=np.zeros_like(width), where=width > 0.0)
         linear = below + weight * (above - below)
@@ -63,15 +63,15 @@ def refine_heights(samplers: Sequence[Sampler], heights: Array, tolerance: float
     def sample(places: Array) -> Array:
         return np.array([sampler(places) for sampler in samplers])
 
-    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> NDArray[np.bool_]:
-        off: NDArray[np.bool_] = np.abs(exact - 0.5 * (below + above)) > allowed
+    def inaccurate(below: Array, above: Array, exact: Array, allowed: Array) -> Any:
+        off = np.abs(exact - 0.5 * (below + above)) > allowed
         return off.reshape(-1, off.shape[-1]).any(axis=0)
 
     return _halve_intervals(sample, heights, tolerance, inaccurate)
 
 
 def _halve_intervals(
-    sample: Sampler, places: Array, tolerance: float, inaccurate: Callable[..., NDArray[np.bool_]]
+    sample: Sampler, places: Array, tolerance: float, inaccurate: Callable[..., Any]
 ) -> tuple[Array, Array]:
     """Places with as many between them as it takes, and the values (..., k) there.
 
